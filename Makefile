@@ -1,0 +1,58 @@
+# Everything here sets up what it needs: python3 (3.11 or newer, with venv), make and cc are enough.
+# Tests, types and benchmarks use the installed wheel, not the source tree: what is checked is what ships.
+PYTHON ?= python3
+VENV ?= .venv
+OUT ?= results
+BIN := $(VENV)/bin
+FOLDERS := robots solvers formulations control benchmarks cli
+SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
+
+.PHONY: help bench test test-long lint format types clean
+
+help:
+	@echo "make bench      the semicircle: formulations x solvers, one table (results in $(OUT)/)"
+	@echo "make test       the tests, under 5 minutes"
+	@echo "make test-long  the same tests with more states"
+	@echo "make lint       ruff"
+	@echo "make types      mypy --strict on the installed library"
+	@echo "make format     let ruff format the sources"
+	@echo "make clean      remove what the above made, results aside"
+
+bench: $(VENV)/.installed
+	$(BIN)/kinqp sweep --overwrite --out $(OUT)
+
+test: $(VENV)/.installed
+	$(BIN)/python -m pytest -m "not long"
+
+test-long: $(VENV)/.installed
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.dependencies
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+format: $(VENV)/.dependencies
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+types: $(VENV)/.installed
+	$(BIN)/mypy --strict -p kinqp
+
+$(VENV)/.dependencies: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys, venv; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "kinqp needs Python 3.11 or newer with its venv module; name one with: make PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt ".[test,lint]"
+	@rm -rf build *.egg-info
+	@touch $@
+
+$(VENV)/.installed: $(VENV)/.dependencies $(SOURCES)
+	@rm -rf build dist *.egg-info
+	$(BIN)/python -m pip wheel --quiet --constraint constraints.txt --no-deps --wheel-dir dist .
+	$(BIN)/python -m pip install --quiet --no-deps --force-reinstall dist/*.whl
+	@rm -rf build *.egg-info
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,5 @@
+"""The `kinqp` command."""
+
+from .app import main
+
+__all__ = ["main"]

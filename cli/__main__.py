@@ -1,0 +1,5 @@
+"""`python -m kinqp.cli`, the same as `kinqp`."""
+
+from . import main
+
+main()

@@ -1,0 +1,114 @@
+"""The `kinqp` command: no logic of its own, only words for people."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ..benchmarks import (
+    TABLE_WIDTH,
+    ConfigError,
+    Store,
+    StoreError,
+    available_scenarios,
+    get_scenario,
+    load_config,
+    sweep,
+    sweep_table,
+)
+from ..formulations import MODE_NAMES, ModeError, available_formulations, get_formulation
+from ..robots import RobotError, available_robots
+from ..solvers import OptionError, UnknownOptionError, available_solvers
+from ..solvers.plugins import PluginError
+from .interrupt import interruptible
+
+# What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
+USER_ERRORS = (ConfigError, ModeError, OptionError, PluginError, RobotError, StoreError, UnknownOptionError, OSError)
+
+app = typer.Typer(
+    name="kinqp",
+    help="Motion of hand-guided robot arms as quadratic programs: declare once, solve with anything, benchmark it.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.command("list")
+def list_all() -> None:
+    """List robots, modes, formulations, solvers and scenarios."""
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column()
+    described = {name: (type(get_formulation(name)).__doc__ or "").splitlines()[0] for name in available_formulations()}
+    rows: dict[str, dict[str, str]] = {
+        "robots": dict.fromkeys(available_robots(), ""),
+        "modes": dict.fromkeys(MODE_NAMES, ""),
+        "formulations": described,
+        "solvers": dict.fromkeys(available_solvers(), ""),
+        "scenarios": {name: get_scenario(name).description for name in available_scenarios()},
+    }
+    for kind, entries in rows.items():
+        for index, (name, text) in enumerate(entries.items()):
+            table.add_row(kind if index == 0 else "", name, text)
+    _console().print(table)
+
+
+@app.command("sweep")
+def run_sweep(
+    config: Annotated[Path | None, typer.Argument(help="TOML file; without it, the shipped default.")] = None,
+    out: Annotated[Path, typer.Option(help="Results folder.")] = Path("results"),
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the sweep in the results folder.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the sweep in the results folder.")] = False,
+) -> None:
+    """Run formulations x solvers x scenarios in closed loop and print the table."""
+    console = _console()
+    store = Store(out)
+    progress = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    loaded = load_config(config)
+    try:
+        with progress, interruptible() as interrupted:
+            bar = progress.add_task("starting")
+
+            def on_progress(done: int, total: int, cell: str) -> None:
+                interrupted()
+                progress.update(bar, completed=done, total=total, description=cell)
+
+            sweep(loaded, out, resume=resume, overwrite=overwrite, on_progress=on_progress)
+    except KeyboardInterrupt:
+        if any((out / "cells").glob("*.parquet")):
+            console.print(sweep_table(store))
+        again = " ".join(["kinqp sweep", *([str(config)] if config else []), "--out", str(out), "--resume"])
+        console.print(f"Interrupted; {out} keeps all runs done. Next: {again}")
+        raise typer.Exit(130) from None
+    console.print(sweep_table(store))
+    console.print(f"Wrote manifest.json and one Parquet file per cell to {out}. Next: read them with polars.")
+
+
+def _console() -> Console:
+    # A narrower terminal, or none, would cut figures off; wrapped lines can still be read.
+    return Console(width=max(TABLE_WIDTH, Console().width))
+
+
+def main() -> None:
+    """Run the command; what a user got wrong ends in one sentence and exit code 2, not in a traceback."""
+    try:
+        app()
+    except USER_ERRORS as error:
+        Console(stderr=True, soft_wrap=True).print(f"kinqp: {error}", style="red", highlight=False, markup=False)
+        sys.exit(2)

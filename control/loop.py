@@ -1,0 +1,168 @@
+"""The closed loop: state, QP, command, integration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from ..formulations import DEFAULT_DT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..formulations import Mode, StepResult
+    from ..robots import Robot
+    from ..solvers import Status
+
+    Array = NDArray[np.float64]
+
+
+class Step(Protocol):
+    """What the loop asks of a controller; `make_step` makes one."""
+
+    @property
+    def robot(self) -> Robot:
+        """The arm."""
+
+    @property
+    def mode(self) -> Mode:
+        """The motion mode."""
+
+    def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
+        """Give the command at a state."""
+
+
+class Guide(Protocol):
+    """Who guides the tool: a path follower, an operator."""
+
+    def twist(self, t: float, pose: Array) -> Array:
+        """Twist asked for at time `t` [s] with the tool at `pose` (4, 4): shape (6,), world axes [m/s, rad/s]."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A closed-loop run, one entry per tick.
+
+    Attributes
+    ----------
+    t : ndarray, shape (N,)
+        Time [s].
+    q : ndarray, shape (N, nv)
+        State before the command [rad or m].
+    v : ndarray, shape (N, m_free)
+        Velocity asked for, along the mode's axes [m/s, rad/s].
+    qd : ndarray, shape (N, nv)
+        Command [rad/s or m/s].
+    position : ndarray, shape (N, 3)
+        Tool centre point [m].
+    eps : ndarray, shape (N, m_free)
+        Cartesian error [m/s, rad/s].
+    status : tuple of Status
+    iterations : ndarray of int, shape (N,)
+    active : tuple of tuple of str
+        Names of the rows that held the command back.
+    fixed_error, bound_violation, sigma_min, setup_time, solve_time : ndarray, shape (N,)
+        As in `StepResult`.
+    message : tuple of str
+    q_end : ndarray, shape (nv,)
+        State after the last command [rad or m].
+    """
+
+    t: Array
+    q: Array
+    v: Array
+    qd: Array
+    position: Array
+    eps: Array
+    status: tuple[Status, ...]
+    iterations: NDArray[np.int64]
+    active: tuple[tuple[str, ...], ...]
+    fixed_error: Array
+    bound_violation: Array
+    sigma_min: Array
+    setup_time: Array
+    solve_time: Array
+    message: tuple[str, ...]
+    q_end: Array
+
+    def acceleration(self) -> Array:
+        """Joint accelerations by differences of the commands, from rest, shape (N, nv) [rad/s^2 or m/s^2]."""
+        dt = self.t[1] - self.t[0]
+        acceleration: Array = np.diff(self.qd, axis=0, prepend=0.0) / dt
+        return acceleration
+
+
+_PER_TICK = ("status", "active", "message")
+
+
+def simulate(
+    step: Step,
+    guide: Guide,
+    q0: ArrayLike,
+    duration: float,
+    *,
+    dt: float = DEFAULT_DT,
+    on_tick: Callable[[int, int], None] | None = None,
+) -> Trajectory:
+    """Run the closed loop: ask the guide, compute the command, integrate it exactly over one period.
+
+    A tick whose QP fails sends the safe stop, and the run goes on: the failure is in the result.
+
+    Parameters
+    ----------
+    step : Step
+        The controller; `dt` is handed to it at every tick.
+    guide : Guide
+        Gives the twist asked for.
+    q0 : array_like, shape (nv,)
+        Start [rad or m].
+    duration : float
+        [s].
+    dt : float
+        Control period [s].
+    on_tick : callable, optional
+        Called with (ticks done, ticks in all) after every tick.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    ValueError
+        Naming the input that is not usable.
+    """
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+    ticks = round(duration / dt) if np.isfinite(duration) else 0
+    if ticks < 2:
+        raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
+    free = list(step.mode.free_rows)
+    q = np.array(q0, dtype=float)
+    states, twists, positions, results = [], [], [], []
+    for tick in range(ticks):
+        pose = step.robot.pose(q)
+        v = (step.mode.twist_map_at(pose) @ guide.twist(tick * dt, pose))[free]
+        result = step(q, v, dt=dt)
+        states.append(q)
+        twists.append(v)
+        positions.append(pose[:3, 3])
+        results.append(result)
+        q = q + dt * result.qd
+        if on_tick is not None:
+            on_tick(tick + 1, ticks)
+    columns: dict[str, object] = {
+        field.name: [getattr(result, field.name) for result in results] for field in fields(results[0])
+    }
+    return Trajectory(
+        t=np.arange(ticks, dtype=np.float64) * dt,
+        q=np.array(states),
+        v=np.array(twists),
+        position=np.array(positions),
+        q_end=q,
+        **{name: tuple(c) if name in _PER_TICK else np.array(c) for name, c in columns.items()},  # type: ignore[arg-type]  # the columns are named after StepResult's fields, which mypy can't follow
+    )

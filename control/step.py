@@ -1,0 +1,159 @@
+"""One control cycle, from state and hand velocity to a joint velocity command that can be sent."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from ..formulations import Evaluator, Mode, StepResult, get_formulation, lower
+from ..solvers import Status, get_solver
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..formulations import Formulation, Instance
+    from ..robots import Robot
+    from ..solvers import Solution, Solver
+
+    Array = NDArray[np.float64]
+
+# What the application promises of the locked rows, relative to the speed they compensate [-].
+FIXED_TOLERANCE: Final = 1e-9
+# Where less than this is compensated in a locked row, it is judged absolutely [m/s, rad/s].
+FIXED_FLOOR: Final = 1.0
+# What a joint velocity may exceed its bounds by [rad/s or m/s]: a thousandth of the encoder noise of a good arm over
+# 1 ms, and above the primal tolerance of an interior-point solver asked for 1e-9.
+BOUND_TOLERANCE: Final = 1e-8
+
+
+class InterpretedStep:
+    """A formulation on a robot in a mode, solved by any solver, called once per control period.
+
+    A command is sent only if the solver's answer holds: finite, within the bounds to `BOUND_TOLERANCE`, the locked
+    rows exact to `FIXED_TOLERANCE` relative to the joint speed's share in them. Otherwise the command is the safe
+    stop, zero velocity, which no bound excludes, and `status` says why.
+
+    Not to be shared between threads.
+    """
+
+    def __init__(self, robot: Robot, formulation: Formulation, mode: Mode, solver: Solver) -> None:
+        self.robot: Final = robot
+        self.mode: Final = mode
+        self.formulation: Final = formulation
+        self.solver: Final = solver
+        self._evaluator: Final = Evaluator(lower(formulation, robot, mode))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the run-time inputs, beyond `q` and `v`, that a call takes by keyword."""
+        return tuple(i.name for i in self._evaluator.inputs if i.name not in ("q", "v"))
+
+    def evaluate(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> Instance:
+        """Give the numbers of the QP at a state, without solving it; arguments as in a call."""
+        return self._evaluator(q=q, v=v, **inputs)
+
+    def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
+        """Compute the command.
+
+        Parameters
+        ----------
+        q : array_like, shape (nv,)
+            Joint positions [rad or m].
+        v : array_like, shape (m_free,)
+            Velocity that the hand asks for, along the mode's axes [m/s, rad/s].
+        **inputs : array_like
+            Any of `inputs`: limits, weights, `dt`, `v_fixed`, ...; each for this call only.
+
+        Raises
+        ------
+        InputError
+            Naming the input that is unknown, missing, of the wrong shape, not finite or out of range.
+        """
+        instance = self._evaluator(q=q, v=v, **inputs)
+        return self._judge(instance, self.solver.solve(instance.qp))
+
+    def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> list[StepResult]:
+        """Compute the commands of many states, one after the other.
+
+        Parameters
+        ----------
+        Q : array_like, shape (N, nv)
+            Joint positions [rad or m].
+        V : array_like, shape (N, m_free)
+            Velocities that the hand asks for [m/s, rad/s].
+        **inputs : array_like
+            As in a call, the same for all states.
+        """
+        states, twists = np.asarray(Q, dtype=float), np.asarray(V, dtype=float)
+        if states.ndim != 2 or twists.ndim != 2 or len(states) != len(twists):
+            raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
+        return [self(q, v, **inputs) for q, v in zip(states, twists, strict=True)]
+
+    def _judge(self, instance: Instance, solution: Solution) -> StepResult:
+        status, message = solution.status, solution.message
+        qd = instance.K @ solution.x + instance.k
+        fixed_error = bound_violation = np.inf
+        if np.isfinite(qd).all():
+            residual = np.abs(instance.J_fixed @ qd - instance.v_fixed)
+            share = np.abs(instance.J_fixed) @ np.abs(qd) + np.abs(instance.v_fixed)
+            fixed_error = float(np.max(residual, initial=0.0))
+            excess = np.maximum(qd - instance.qd_hi, instance.qd_lo - qd)
+            bound_violation = float(np.max(excess, initial=0.0))
+            if status is Status.SOLVED and bound_violation > BOUND_TOLERANCE:
+                status, message = Status.INACCURATE, f"a joint exceeds its velocity bound by {bound_violation:.1e}"
+            if status is Status.SOLVED and np.any(residual > FIXED_TOLERANCE * np.maximum(share, FIXED_FLOOR)):
+                status, message = Status.INACCURATE, f"a locked row is off by {fixed_error:.1e}"
+        elif status is Status.SOLVED:
+            status, message = Status.INACCURATE, "the command is not finite"
+        solved = status is Status.SOLVED
+        command = qd if solved else np.zeros(self.robot.nv)
+        return StepResult(
+            qd=command,
+            eps=instance.J_free @ command - instance.v,
+            status=status,
+            iterations=solution.iterations,
+            active=self._evaluator.active_rows(instance.qp, solution) if solved else (),
+            fixed_error=fixed_error,
+            bound_violation=bound_violation,
+            sigma_min=_smallest_singular_value(instance.J_bar),
+            setup_time=solution.setup_time,
+            solve_time=solution.solve_time,
+            message=message,
+        )
+
+
+def _smallest_singular_value(matrix: Array) -> float:
+    # The square root of the Gram matrix's eigenvalue would lose half the digits near a singularity.
+    return float(np.linalg.svd(matrix, compute_uv=False)[-1])
+
+
+def make_step(
+    robot: Robot, formulation: str | Formulation, mode: str | Mode, solver: str | Solver = "clarabel", **options: Any
+) -> InterpretedStep:
+    """Make the control cycle of a formulation on a robot in a mode, solved by any solver.
+
+    Parameters
+    ----------
+    robot : Robot
+        From `load_robot`.
+    formulation : str or Formulation
+        A registered name, `module:Name`, or an instance; options in brackets, as in "cartesian-error(bounds=thesis)".
+    mode : str or Mode
+        As in `Mode.parse`, or an instance.
+    solver : str or Solver
+        A registered name, `module:Name`, or an instance.
+    **options
+        Handed to the solver, where it is given by name.
+
+    Returns
+    -------
+    InterpretedStep
+        Call it with (q, v).
+    """
+    return InterpretedStep(
+        robot,
+        get_formulation(formulation),
+        Mode.parse(mode) if isinstance(mode, str) else mode,
+        get_solver(solver, **options),
+    )

@@ -1,0 +1,180 @@
+"""A lowered formulation in numbers: inputs checked, QP data out, without going through CasADi's slow containers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import casadi as ca
+import numpy as np
+
+from ..solvers import QP
+from .lowering import DATA, Lowered
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..solvers import Solution
+    from .tick import Input
+
+    Array = NDArray[np.float64]
+
+_OBSERVED: Final = ("J_free", "J_fixed", "J_bar", "qd_lo", "qd_hi")
+# A row counts as active when its multiplier carries more than this share of the objective's gradient.
+_ACTIVE_SHARE: Final = 1e-6
+# ... and is closer to its side than what a drive resolves [rad/s or m/s].
+_ACTIVE_SLACK: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A formulation's QP at one state, and what is needed to use and to judge its answer.
+
+    Attributes
+    ----------
+    qp : QP
+        The numbers.
+    K, k : ndarray, shapes (nv, n) and (nv,)
+        The command is K x + k.
+    J_free, J_fixed, J_bar : ndarray, shapes (m_free, nv), (m_fixed, nv), (m_free, nv)
+        Guided and locked rows of the Jacobian, and the guided ones within the null space of the locked ones.
+    qd_lo, qd_hi : ndarray, shape (nv,)
+        Joint velocity bounds [rad/s or m/s].
+    v, v_fixed : ndarray, shapes (m_free,) and (m_fixed,)
+        What was asked of the two [m/s, rad/s].
+    """
+
+    qp: QP
+    K: Array
+    k: Array
+    J_free: Array
+    J_fixed: Array
+    J_bar: Array
+    qd_lo: Array
+    qd_hi: Array
+    v: Array
+    v_fixed: Array
+
+
+class InputError(ValueError):
+    """A run-time input of a step has the wrong shape, size or value; the message names it."""
+
+
+class Evaluator:
+    """Evaluates a lowered formulation at a state.
+
+    Not to be shared between threads: it owns the buffers that it computes in. Results are copies.
+
+    Parameters
+    ----------
+    lowered : Lowered
+        What to evaluate.
+    """
+
+    def __init__(self, lowered: Lowered) -> None:
+        self.lowered: Final = lowered
+        tick = lowered.tick
+        # Also what the formulation itself does not use: its command is judged against the limits all the same.
+        observed = {name: getattr(tick, name) for name in _OBSERVED} | {"v_fixed": tick.v_fixed}
+        data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
+        self.inputs: Final[tuple[Input, ...]] = tick.inputs
+        outputs = data | {name: value for name, value in observed.items() if name != "v_fixed"}
+        # CasADi writes column by column, NumPy reads row by row: hence the transposes.
+        function = ca.Function(
+            "evaluate",
+            [given.symbol for given in self.inputs],
+            [ca.densify(ca.SX(value).T) for value in outputs.values()],
+        )
+        # The pair must be kept together: the buffer owns what the call works on.
+        self._buffer, self._evaluate = function.buffer()
+        self._given: Final = {given.name: np.zeros(given.size) for given in self.inputs}
+        for index, values in enumerate(self._given.values()):
+            self._buffer.set_arg(index, memoryview(values))  # type: ignore[arg-type,call-arg]  # CasADi's stubs give the C++ signature
+        self._results: Final = {name: np.zeros(value.shape) for name, value in outputs.items()}
+        for index, matrix in enumerate(self._results.values()):
+            self._buffer.set_res(index, memoryview(matrix.reshape(-1)))  # type: ignore[arg-type,call-arg]  # as above
+        self._defaults: Final = {given.name: given.default for given in self.inputs if given.default is not None}
+        self._specs: Final = {given.name: given for given in self.inputs}
+        self._required: Final = [given.name for given in self.inputs if given.default is None]
+        self._free_rows: Final = ", ".join(lowered.mode.free_names)
+
+    def __call__(self, **inputs: ArrayLike) -> Instance:
+        """Evaluate at a state.
+
+        Parameters
+        ----------
+        **inputs : array_like
+            `q` and `v` always, and whatever else the formulation asks for; all other inputs have defaults.
+
+        Raises
+        ------
+        InputError
+            Naming an input that is unknown, missing, of the wrong size, not finite or out of its range.
+        """
+        self._fill(inputs)
+        self._evaluate()
+        r = {name: matrix.copy() for name, matrix in self._results.items()}
+        columns = {name: r[name][:, 0] for name in ("g", "b", "l", "u", "lb", "ub", "k", "qd_lo", "qd_hi")}
+        start = r["x_feasible"]
+        qp = QP.trusted(
+            H=r["H"], g=columns["g"], A=r["A"], b=columns["b"], C=r["C"], l=columns["l"], u=columns["u"],
+            lb=columns["lb"], ub=columns["ub"], x_feasible=start[:, 0] if start.size else None,
+        )  # fmt: skip
+        return Instance(
+            qp, r["K"], columns["k"], r["J_free"], r["J_fixed"], r["J_bar"], columns["qd_lo"], columns["qd_hi"],
+            self._given["v"].copy(), self._given["v_fixed"].copy(),
+        )  # fmt: skip
+
+    def _fill(self, inputs: Mapping[str, ArrayLike]) -> None:
+        for name in inputs:
+            if name not in self._specs:
+                raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
+        for name in self._required:
+            if name not in inputs:
+                raise InputError(f"{name}: expected {self._describe(name)}, got nothing")
+        for name, values in self._given.items():
+            if name in inputs:
+                values[:] = self._checked(name, inputs[name])
+            else:
+                values[:] = self._defaults[name]
+
+    def _checked(self, name: str, given: ArrayLike) -> Array:
+        spec = self._specs[name]
+        try:
+            value = np.asarray(given, dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{name}: expected {self._describe(name)}, got {given!r}") from None
+        if value.shape != (spec.size,) and not (spec.default is not None and value.ndim == 0):
+            raise InputError(f"{name}: expected {self._describe(name)}, got shape {value.shape}")
+        if np.isnan(value).any() or not (spec.may_be_infinite or np.isfinite(value).all()):
+            raise InputError(f"{name}: expected finite numbers, got {value}")
+        if (value < spec.lowest).any() or (spec.positive and (value <= spec.lowest).any()):
+            bound = "above" if spec.positive else "not below"
+            raise InputError(f"{name}: expected numbers {bound} {spec.lowest:g} {spec.unit}, got {value}")
+        return value
+
+    def _describe(self, name: str) -> str:
+        spec = self._specs[name]
+        if name == "v":
+            return f"shape ({spec.size},) for mode {self.lowered.mode} (rows {self._free_rows})"
+        return f"shape ({spec.size},) [{spec.unit}]"
+
+    def active_rows(self, qp: QP, solution: Solution) -> tuple[str, ...]:
+        """Names of the rows that hold the solution back, each with its side, as in "joint limits[3] upper"."""
+        gradient = np.abs(qp.H @ solution.x) + np.abs(qp.g)
+        least = _ACTIVE_SHARE * float(np.max(gradient, initial=0.0)) + 1e-12
+        rows = self.lowered.rows
+        names: list[str] = []
+        for labels, multipliers, value, lower, upper in (
+            (rows.inequalities, solution.z, qp.C @ solution.x, qp.l, qp.u),
+            (rows.box, solution.z_box, solution.x, qp.lb, qp.ub),
+        ):
+            # Where nothing is lost the gradient is zero, and an interior point's tiny multipliers are large beside it.
+            slack = np.where(multipliers > 0.0, upper - value, value - lower)
+            names += [
+                f"{labels[i]} {'upper' if multipliers[i] > 0.0 else 'lower'}"
+                for i in np.flatnonzero((np.abs(multipliers) > least) & (slack < _ACTIVE_SLACK))
+            ]
+        return tuple(names)

@@ -1,0 +1,56 @@
+"""What one control cycle returns, however it was computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from ..solvers import Status
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """The command of one control cycle and how it came about.
+
+    Attributes
+    ----------
+    qd : ndarray, shape (nv,)
+        Joint velocity command [rad/s or m/s]; zero (the safe stop) unless `status` is SOLVED.
+    eps : ndarray, shape (m_free,)
+        Cartesian error J_free qd - v of that command [m/s, rad/s].
+    status : Status
+        SOLVED, or why the command is the safe stop.
+    iterations : int
+        As the solver counts them.
+    active : tuple of str
+        Rows that hold the solution back, as in "joint limits[3] upper"; empty at a safe stop.
+    fixed_error : float
+        Largest error of the locked rows, max |J_fixed qd - v_fixed| [m/s, rad/s].
+    bound_violation : float
+        Largest excess over the joint velocity bounds, zero if none [rad/s or m/s]. Like `fixed_error`, of what the
+        solver proposed, also where that was refused.
+    sigma_min : float
+        Smallest singular value of J_bar, the guided rows within the null space of the locked ones.
+    setup_time, solve_time : float
+        Time of set-up or update, and of the solve itself, through Python [s].
+    message : str
+        One sentence where `status` is not SOLVED.
+    """
+
+    qd: Array
+    eps: Array
+    status: Status
+    iterations: int
+    active: tuple[str, ...]
+    fixed_error: float
+    bound_violation: float
+    sigma_min: float
+    setup_time: float
+    solve_time: float
+    message: str

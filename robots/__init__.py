@@ -1,0 +1,30 @@
+"""
+Arms: limits, and numeric and symbolic kinematics, from URDF files or DH tables.
+
+Use `load_robot`; everything else is for those who add a robot or build on one.
+"""
+
+from .checks import FloatArray, finite_vector
+from .dh import DhRow, robot_from_dh
+from .errors import RobotError
+from .limits import DEFAULT_PRISMATIC_QDD_MAX, DEFAULT_REVOLUTE_QDD_MAX
+from .registry import RobotBuilder, available_robots, load_robot
+from .robot import Robot
+from .symbolic import SymbolicKinematics
+from .urdf import robot_from_urdf
+
+__all__ = [
+    "DEFAULT_PRISMATIC_QDD_MAX",
+    "DEFAULT_REVOLUTE_QDD_MAX",
+    "DhRow",
+    "FloatArray",
+    "Robot",
+    "RobotBuilder",
+    "RobotError",
+    "SymbolicKinematics",
+    "available_robots",
+    "finite_vector",
+    "load_robot",
+    "robot_from_dh",
+    "robot_from_urdf",
+]

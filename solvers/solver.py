@@ -1,0 +1,107 @@
+"""The interface that every backend implements."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from importlib.util import find_spec
+from time import perf_counter_ns
+from typing import TYPE_CHECKING, ClassVar, final
+
+from .options import positive
+from .solution import RawSolution, Solution, Status, judge
+
+if TYPE_CHECKING:
+    from .qp import QP
+
+
+class BackendError(RuntimeError):
+    """A backend could not do its work; ends as `Status.FAILED`."""
+
+
+#: What may come out of a backend's numerics. TypeError and the like are not here: they are mistakes in a
+#: backend's adapter and must be seen.
+BACKEND_ERRORS = (BackendError, ArithmeticError, ValueError, RuntimeError)
+
+
+class Solver(ABC):
+    """A method that solves QPs, one after another.
+
+    A backend is a final subclass that says what it can do in the class variables below, takes its options as
+    keyword arguments of its constructor and implements three hooks. It keeps its set-up between calls, so one
+    instance belongs to one thread.
+
+    Parameters
+    ----------
+    tolerance
+        Accuracy that the backend is asked for; each backend says what it applies it to.
+    """
+
+    #: Registered name, kebab-case.
+    name: ClassVar[str]
+    #: Modules that must be importable for this backend to work.
+    requires: ClassVar[tuple[str, ...]] = ()
+    #: Whether it starts from `QP.x_feasible` and cannot do without.
+    needs_feasible_start: ClassVar[bool] = False
+    #: Whether it solves problems whose H is only positive semi-definite.
+    handles_semidefinite: ClassVar[bool] = False
+    #: Whether it recognises problems without a solution.
+    detects_infeasibility: ClassVar[bool] = False
+
+    def __init__(self, *, tolerance: float) -> None:
+        self.tolerance = positive("tolerance", tolerance)
+        self._structure: tuple[int, int, int, bytes] | None = None
+
+    @classmethod
+    @final
+    def missing(cls) -> tuple[str, ...]:
+        """Top-level modules that this backend requires and that are not installed; imports nothing."""
+        return tuple(module for module in cls.requires if find_spec(module) is None)
+
+    @classmethod
+    @final
+    def available(cls) -> bool:
+        """Whether everything this backend requires is installed."""
+        return not cls.missing()
+
+    @final
+    def solve(self, qp: QP) -> Solution:
+        """Solve a QP, reusing the last set-up where the structure is the same, and judge the answer.
+
+        Failures of the backend do not raise: they come back as `Status.FAILED` with a message. After anything but
+        `Status.SOLVED` the set-up is dropped, because some backends do not recover from bad data by an update.
+        """
+        start = ready = perf_counter_ns()
+        structure = qp.structure
+        try:
+            if structure == self._structure:
+                self._update(qp)
+            else:
+                self._setup(qp)
+            ready = perf_counter_ns()
+            raw = self._solve(qp)
+            done = perf_counter_ns()
+            solution = judge(qp, raw, 1e-9 * (ready - start), 1e-9 * (done - ready))
+        except BACKEND_ERRORS as error:
+            done = perf_counter_ns()
+            text = str(error) if isinstance(error, BackendError) else f"{type(error).__name__}: {error}"
+            failure = RawSolution(claimed=Status.FAILED, message=text)
+            solution = judge(qp, failure, 1e-9 * (ready - start), 1e-9 * (done - ready))
+        self._structure = structure if solution.status is Status.SOLVED else None
+        return solution
+
+    @final
+    def reset(self) -> None:
+        """Forget the set-up, so that the next answer depends on the next problem alone."""
+        self._structure = None
+
+    @abstractmethod
+    def _setup(self, qp: QP) -> None:
+        """Prepare for problems with the structure of `qp`, and take over its data."""
+
+    @abstractmethod
+    def _update(self, qp: QP) -> None:
+        """Take over the data of `qp`, whose structure is the one last set up."""
+
+    @abstractmethod
+    def _solve(self, qp: QP) -> RawSolution:
+        """Solve the problem that was last set up or updated, which is `qp`."""

@@ -1,0 +1,118 @@
+"""The command, as people type it."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+TINY = """
+scenarios = ["tests.benchmarks.tiny:tiny"]
+solvers = ["thesis-active-set", "piqp"]
+repeats = 2
+warm_up = 2
+"""
+
+
+def command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "kinqp.cli", *map(str, arguments)]
+
+
+def environment() -> dict[str, str]:
+    # The tests' own scenario is found from the repository's root.
+    return os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+def kinqp(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments), capture_output=True, text=True, env=environment(), timeout=120, check=False
+    )
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "sweep.toml"
+    path.write_text(TINY)
+    return path
+
+
+def test_list_names_everything() -> None:
+    done = kinqp("list")
+    assert done.returncode == 0
+    for name in (
+        "lbr_med14", "lbr_med7", "ur5e", "davinci5", "fix-orientation", "rcm", "cartesian-error", "joint-space",
+        "thesis-active-set", "clarabel", "piqp", "semicircle",
+    ):  # fmt: skip
+        assert name in done.stdout.split(), name
+
+
+def test_sweep_prints_the_table_and_says_where_it_wrote(config: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = kinqp("sweep", config, "--out", out)
+    assert done.returncode == 0, done.stderr
+    for text in (
+        "cartesian-error",
+        "joint-space",
+        "thesis-active-set",
+        "piqp",
+        "time us",
+        "p99",
+        "fixed",
+        "cpu",
+        "Next:",
+    ):
+        assert text in done.stdout
+    assert "…" not in done.stdout, "no figure is cut"
+    assert str(out) in done.stdout.replace("\n", "")
+    assert len(list((out / "cells").glob("*.parquet"))) == 4
+    again = kinqp("sweep", config, "--out", out)
+    assert again.returncode == 2
+    assert "--resume" in again.stderr
+    assert "Traceback" not in again.stderr
+    assert kinqp("sweep", config, "--out", out, "--resume").returncode == 0
+    assert kinqp("sweep", config, "--out", out, "--overwrite").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('solvers = ["clarable"]', "did you mean 'clarabel'"),
+        ("solver = 1", "got 'solver'"),
+        ("repeats = 0", "repeats"),
+    ],
+)
+def test_a_mistake_is_one_sentence_and_nothing_is_written(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "bad.toml"
+    path.write_text(text)
+    done = kinqp("sweep", path, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_ctrl_c_keeps_the_runs_done(tmp_path: Path) -> None:
+    path, out = tmp_path / "long.toml", tmp_path / "out"
+    path.write_text(TINY.replace("repeats = 2", "repeats = 100000"))
+    process = subprocess.Popen(
+        command("sweep", path, "--out", out),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+    deadline = time.monotonic() + 60.0
+    while not list(out.glob("cells/*.parquet")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130, stderr
+    assert "Interrupted" in stdout
+    assert "--resume" in stdout
+    assert "Traceback" not in stderr
+    assert list(out.glob("cells/*.parquet"))
