@@ -139,6 +139,9 @@ class Evaluator:
                 values[:] = self._checked(name, inputs[name])
             else:
                 values[:] = self._defaults[name]
+        if (self._given["q_min"] > self._given["q_max"]).any():
+            low, high = self._given["q_min"], self._given["q_max"]
+            raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
 
     def _checked(self, name: str, given: ArrayLike) -> Array:
         spec = self._specs[name]

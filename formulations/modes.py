@@ -140,7 +140,7 @@ class Mode:
             Signed distance from the tool centre point to the pivot along the tool's z [m]: positive lies ahead of
             the tool centre point, negative behind it (a trocar that the tip has passed).
         """
-        if not isinstance(depth, (int, float)) or not np.isfinite(depth):
+        if isinstance(depth, bool) or not isinstance(depth, (int, float, np.number)) or not np.isfinite(depth):
             raise ModeError(f"rcm depth: expected a finite number of metres, got {depth!r}")
         return Mode("rcm", (2, *_ROTATIONS), (0, 1), "tool", depth=float(depth), argument=_text(float(depth)))
 
@@ -155,9 +155,9 @@ class Mode:
         ModeError
             Naming the mode, its argument or its frame, and what was expected.
         """
-        body, _, frame = text.partition("@")
-        name, _, argument = body.partition(":")
-        if name not in _PARSERS:
+        body, at, frame = text.partition("@")
+        name, colon, argument = body.partition(":")
+        if name not in _PARSERS or (at and not frame) or (colon and not argument):
             raise ModeError(f"mode: expected one of {', '.join(_PARSERS)}, got {text!r}")
         options: dict[str, Any] = {"frame": frame} if frame else {}
         if name == "rcm" and frame not in ("", "tool"):
