@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV ?= .venv
 OUT ?= results
 BIN := $(VENV)/bin
-FOLDERS := robots solvers formulations control benchmarks cli
+FOLDERS := robots solvers formulations codegen control benchmarks cli
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
 .PHONY: help bench test test-long lint format types clean

@@ -42,7 +42,7 @@ class SweepConfig(BaseModel):
 
     scenarios: Names = ("semicircle",)
     formulations: Names = ("cartesian-error", "joint-space")
-    solvers: Names = ("thesis-active-set", "clarabel", "piqp")
+    solvers: Names = ("active-set", "thesis-active-set", "clarabel", "piqp")
     repeats: Annotated[int, Field(ge=1)] = 3
     warm_up: Annotated[int, Field(ge=0)] = 200
     seed: Annotated[int, Field(ge=0)] = 0

@@ -22,14 +22,27 @@ from ..benchmarks import (
     sweep,
     sweep_table,
 )
+from ..codegen import ExportError, export_c
 from ..formulations import MODE_NAMES, ModeError, available_formulations, get_formulation
-from ..robots import RobotError, available_robots
+from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
+from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
 from .interrupt import interruptible
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
-USER_ERRORS = (ConfigError, ModeError, OptionError, PluginError, RobotError, StoreError, UnknownOptionError, OSError)
+USER_ERRORS = (
+    CompilerError,
+    ConfigError,
+    ExportError,
+    ModeError,
+    OptionError,
+    PluginError,
+    RobotError,
+    StoreError,
+    UnknownOptionError,
+    OSError,
+)
 
 app = typer.Typer(
     name="kinqp",
@@ -98,6 +111,23 @@ def run_sweep(
         raise typer.Exit(130) from None
     console.print(sweep_table(store))
     console.print(f"Wrote manifest.json and one Parquet file per cell to {out}. Next: read them with polars.")
+
+
+@app.command("export")
+def run_export(
+    robot: Annotated[str, typer.Option(help="Registered name, or a URDF file.")],
+    formulation: Annotated[str, typer.Option(help="Registered name, or module:Name.")],
+    mode: Annotated[list[str], typer.Option(help="Motion mode, e.g. fix-orientation or line:z; may be repeated.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    tip: Annotated[str | None, typer.Option(help="Frame at the tool centre point, where the URDF branches.")] = None,
+    name: Annotated[str | None, typer.Option(help="Prefix of files and symbols.")] = None,
+) -> None:
+    """Write a formulation on a robot as a C library that checks itself."""
+    folder = export_c(load_robot(robot, tip=tip), formulation, mode, out, name=name)
+    console = _console()
+    console.print(f"Wrote {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))} to {folder}.")
+    build = folder / "build"
+    console.print(f"Next: cmake -S {folder} -B {build} && cmake --build {build} && ctest --test-dir {build}")
 
 
 def _console() -> Console:

@@ -129,7 +129,7 @@ def _smallest_singular_value(matrix: Array) -> float:
 
 
 def make_step(
-    robot: Robot, formulation: str | Formulation, mode: str | Mode, solver: str | Solver = "clarabel", **options: Any
+    robot: Robot, formulation: str | Formulation, mode: str | Mode, solver: str | Solver = "active-set", **options: Any
 ) -> InterpretedStep:
     """Make the control cycle of a formulation on a robot in a mode, solved by any solver.
 

@@ -3,7 +3,8 @@
 from .base import Formulation
 from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
-from .evaluator import Evaluator, InputError, Instance
+from .evaluator import Evaluator, Instance
+from .inputs import InputError, check_input
 from .inverse import factor_fixed_rows, robust_inverse
 from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
 from .lowering import DATA, Lowered, RowNames, lower
@@ -35,6 +36,7 @@ __all__ = [
     "StepResult",
     "Tick",
     "available_formulations",
+    "check_input",
     "factor_fixed_rows",
     "get_formulation",
     "lower",

@@ -45,13 +45,13 @@ def viable_bound(distance: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> c
     Parameters and result are those of `thesis_bound`.
     """
     step = qdd_max * dt  # velocity that one period of full braking takes away
+    per_step = 1 / (step * dt)  # the only division that both sides of a joint share; divisions are what costs here
     # Beyond this distance qd_max is the smaller of the two; the cap keeps an absent limit (infinite distance) finite.
-    periods = qd_max / step
-    far = step * dt * (periods * (periods + 1) / 2 + 1)
-    delta = ca.fmin(ca.fmax(distance, 0), far) / (step * dt)
-    m = ca.floor((ca.sqrt(1 + 8 * delta) - 1) / 2)
-    theta = (delta - m * (m + 1) / 2) / (m + 1)
-    return ca.fmin(step * (m + theta), qd_max)
+    periods = qd_max * dt * per_step
+    delta = ca.fmin(ca.fmax(distance, 0) * per_step, 0.5 * periods * (periods + 1) + 1)
+    m = ca.floor(0.5 * (ca.sqrt(1 + 8 * delta) - 1))
+    # m + theta with theta put in: one division, and nothing cancels.
+    return ca.fmin(step * (0.5 * m + delta / (m + 1)), qd_max)
 
 
 BOUNDS: Final[dict[str, Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]]] = {

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ..solvers import QP
+from .inputs import InputError, check_input, describe_input
 from .lowering import DATA, Lowered
 
 if TYPE_CHECKING:
@@ -58,10 +59,6 @@ class Instance:
     v_fixed: Array
 
 
-class InputError(ValueError):
-    """A run-time input of a step has the wrong shape, size or value; the message names it."""
-
-
 class Evaluator:
     """Evaluates a lowered formulation at a state.
 
@@ -98,7 +95,6 @@ class Evaluator:
         self._defaults: Final = {given.name: given.default for given in self.inputs if given.default is not None}
         self._specs: Final = {given.name: given for given in self.inputs}
         self._required: Final = [given.name for given in self.inputs if given.default is None]
-        self._free_rows: Final = ", ".join(lowered.mode.free_names)
 
     def __call__(self, **inputs: ArrayLike) -> Instance:
         """Evaluate at a state.
@@ -133,36 +129,16 @@ class Evaluator:
                 raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
         for name in self._required:
             if name not in inputs:
-                raise InputError(f"{name}: expected {self._describe(name)}, got nothing")
+                wanted = describe_input(self._specs[name], self.lowered.mode)
+                raise InputError(f"{name}: expected {wanted}, got nothing")
         for name, values in self._given.items():
             if name in inputs:
-                values[:] = self._checked(name, inputs[name])
+                values[:] = check_input(self._specs[name], inputs[name], self.lowered.mode)
             else:
                 values[:] = self._defaults[name]
         if (self._given["q_min"] > self._given["q_max"]).any():
             low, high = self._given["q_min"], self._given["q_max"]
             raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
-
-    def _checked(self, name: str, given: ArrayLike) -> Array:
-        spec = self._specs[name]
-        try:
-            value = np.asarray(given, dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{name}: expected {self._describe(name)}, got {given!r}") from None
-        if value.shape != (spec.size,) and not (spec.default is not None and value.ndim == 0):
-            raise InputError(f"{name}: expected {self._describe(name)}, got shape {value.shape}")
-        if np.isnan(value).any() or not (spec.may_be_infinite or np.isfinite(value).all()):
-            raise InputError(f"{name}: expected finite numbers, got {value}")
-        if (value < spec.lowest).any() or (spec.positive and (value <= spec.lowest).any()):
-            bound = "above" if spec.positive else "not below"
-            raise InputError(f"{name}: expected numbers {bound} {spec.lowest:g} {spec.unit}, got {value}")
-        return value
-
-    def _describe(self, name: str) -> str:
-        spec = self._specs[name]
-        if name == "v":
-            return f"shape ({spec.size},) for mode {self.lowered.mode} (rows {self._free_rows})"
-        return f"shape ({spec.size},) [{spec.unit}]"
 
     def active_rows(self, qp: QP, solution: Solution) -> tuple[str, ...]:
         """Names of the rows that hold the solution back, each with its side, as in "joint limits[3] upper"."""

@@ -11,6 +11,8 @@ from typing import Final
 
 import casadi as ca
 
+from .algebra import balanced_sum, dot, inverse_of_positive, matmul
+
 # A locked row whose part outside the span of the rows before it is smaller than this (relative) adds no direction:
 # dropping it leaves an error of at most this much in that row, ten times below what the locked rows promise (1e-9).
 DEPENDENT_ROW: Final = 1e-10
@@ -28,10 +30,13 @@ class FixedRows:
         U: orthonormal rows; a dependent row of J_fixed leaves a zero row here.
     lower : ca.SX, shape (m_fixed, m_fixed)
         L: lower triangular; the diagonal entry of a dropped row is zero.
+    reciprocals : tuple of ca.SX
+        1 / L_ii, or zero where row i was dropped.
     """
 
     basis: ca.SX
     lower: ca.SX
+    reciprocals: tuple[ca.SX, ...]
 
     def project(self, rows: ca.SX) -> ca.SX:
         """Take out of `rows`, shape (k, nv), what lies in the span of the locked rows: `rows` N_c.
@@ -39,18 +44,17 @@ class FixedRows:
         Entries that are nothing but rounding become zero. A joint that can't take part in the motion would otherwise
         get a tiny coefficient of random sign, and, resting on its limit, block half of all directions with it.
         """
-        left = rows - (rows @ self.basis.T) @ self.basis
-        noise = ROUNDING * ca.sqrt(ca.sum2(rows * rows))
-        return ca.if_else(ca.fabs(left) > ca.repmat(noise, 1, rows.size2()), left, 0)
+        left = rows - matmul(matmul(rows, self.basis.T), self.basis)
+        noise = ROUNDING**2 * ca.vertcat(*(dot(rows[i, :], rows[i, :]) for i in range(rows.size1())))
+        return ca.if_else(left * left > ca.repmat(noise, 1, rows.size2()), left, 0)
 
     def solve(self, v_fixed: ca.SX) -> ca.SX:
         """Smallest joint velocity, shape (nv, 1), with J_fixed qd = `v_fixed`, (m_fixed, 1), dropped rows aside."""
         along: list[ca.SX] = []
-        for i in range(self.basis.size1()):
-            rest = v_fixed[i] - sum((self.lower[i, j] * along[j] for j in range(i)), ca.SX(0))
-            pivot = self.lower[i, i]
-            along.append(ca.if_else(pivot > 0, rest / ca.if_else(pivot > 0, pivot, 1), 0))
-        return self.basis.T @ ca.vertcat(*along)
+        for i, reciprocal in enumerate(self.reciprocals):
+            rest = v_fixed[i] - balanced_sum([self.lower[i, j] * along[j] for j in range(i)])
+            along.append(rest * reciprocal)
+        return matmul(self.basis.T, ca.vertcat(*along))
 
 
 def factor_fixed_rows(J_fixed: ca.SX) -> FixedRows:
@@ -68,25 +72,26 @@ def factor_fixed_rows(J_fixed: ca.SX) -> FixedRows:
     m, nv = J_fixed.shape
     basis = ca.SX(0, nv)
     lower = ca.SX(m, m)
+    reciprocals: list[ca.SX] = []
     for i in range(m):
         row = J_fixed[i, :]
         rest = row
         for _ in range(2 if i else 0):
-            along = rest @ basis.T
-            rest = rest - along @ basis
+            along = matmul(rest, basis.T)
+            rest = rest - matmul(along, basis)
             lower[i, :i] += along
-        size = ca.dot(rest, rest)
-        kept = size > DEPENDENT_ROW**2 * ca.dot(row, row)
-        norm = ca.sqrt(ca.if_else(kept, size, 1))
-        basis = ca.vertcat(basis, ca.if_else(kept, rest / norm, 0))
-        lower[i, i] = ca.if_else(kept, norm, 0)
-    return FixedRows(basis, lower)
+        size = dot(rest, rest)
+        kept = size > DEPENDENT_ROW**2 * dot(row, row)
+        reciprocals.append(ca.if_else(kept, 1 / ca.sqrt(ca.if_else(kept, size, 1)), 0))
+        basis = ca.vertcat(basis, rest * reciprocals[-1])
+        lower[i, i] = size * reciprocals[-1]
+    return FixedRows(basis, lower, tuple(reciprocals))
 
 
 def robust_inverse(J_bar: ca.SX, threshold: ca.SX, damping_max: ca.SX) -> ca.SX:
     r"""Damped inverse J_bar' (J_bar J_bar' + lambda^2 I)^-1, equal to the pseudo-inverse away from singularities.
 
-    With s a smooth lower estimate of the smallest singular value (`smallest_singular_value_estimate`),
+    With s a smooth lower estimate of the smallest singular value (`squared_singular_value_estimate`),
     :math:`\lambda^2 = \lambda_{max}^2\,(1 - (s/\sigma_0)^2)^2` where :math:`s < \sigma_0`, and exactly zero elsewhere:
     continuous with its first derivative, and largest at the singularity, where the inverse is finite for that reason.
 
@@ -104,15 +109,14 @@ def robust_inverse(J_bar: ca.SX, threshold: ca.SX, damping_max: ca.SX) -> ca.SX:
     ca.SX, shape (nv, m)
         J#.
     """
-    gram = J_bar @ J_bar.T
-    s2 = smallest_singular_value_estimate(gram) ** 2
-    weakness = ca.fmax(1 - s2 / threshold**2, 0)
+    gram = matmul(J_bar, J_bar.T)
+    weakness = ca.fmax(1 - squared_singular_value_estimate(gram) / threshold**2, 0)
     damping2 = (damping_max * weakness) ** 2
-    return _solve_positive(gram + damping2 * ca.SX.eye(gram.size1()), J_bar).T
+    return matmul(J_bar.T, inverse_of_positive(gram + damping2 * ca.SX.eye(gram.size1())))
 
 
-def smallest_singular_value_estimate(gram: ca.SX) -> ca.SX:
-    r"""Smooth lower estimate of the smallest singular value of J from G = J J', shape (m, m).
+def squared_singular_value_estimate(gram: ca.SX) -> ca.SX:
+    r"""Smooth lower estimate s^2 of the squared smallest singular value of J from G = J J', shape (m, m).
 
     :math:`s = \|G^{-1}\|_F^{-1/2}` lies between :math:`\sigma_{min}/m^{1/4}` and :math:`\sigma_{min}`; unlike the
     singular value itself it has derivatives where two singular values meet.
@@ -120,26 +124,5 @@ def smallest_singular_value_estimate(gram: ca.SX) -> ca.SX:
     m = gram.size1()
     # A shift far below any threshold in use keeps the inverse finite at the singularity itself.
     shift = 1e-12 * ca.trace(gram) + 1e-100
-    inverse = _solve_positive(gram + shift * ca.SX.eye(m), ca.SX.eye(m))
-    return 1 / ca.sqrt(ca.sqrt(ca.sumsqr(inverse)))
-
-
-def _solve_positive(matrix: ca.SX, rhs: ca.SX) -> ca.SX:
-    """Solve a symmetric positive definite system by LDL' without pivoting, unrolled."""
-    m = matrix.size1()
-    lower = ca.SX.eye(m)
-    pivots: list[ca.SX] = []
-    for j in range(m):
-        pivots.append(matrix[j, j] - sum((lower[j, k] ** 2 * pivots[k] for k in range(j)), ca.SX(0)))
-        for i in range(j + 1, m):
-            rest = matrix[i, j] - sum((lower[i, k] * lower[j, k] * pivots[k] for k in range(j)), ca.SX(0))
-            lower[i, j] = rest / pivots[j]
-    rows = [rhs[i, :] for i in range(m)]
-    for i in range(m):
-        for k in range(i):
-            rows[i] = rows[i] - lower[i, k] * rows[k]
-    rows = [row / pivot for row, pivot in zip(rows, pivots, strict=True)]
-    for i in reversed(range(m)):
-        for k in range(i + 1, m):
-            rows[i] = rows[i] - lower[k, i] * rows[k]
-    return ca.vertcat(*rows)
+    inverse = inverse_of_positive(gram + shift * ca.SX.eye(m))
+    return 1 / ca.sqrt(balanced_sum([entry**2 for entry in ca.vertsplit(ca.vec(inverse))]))

@@ -155,7 +155,9 @@ class Mode:
         ModeError
             Naming the mode, its argument or its frame, and what was expected.
         """
-        body, at, frame = text.partition("@")
+        body, at, frame = text.strip().partition("@")
+        # "line z" is what people say and type.
+        body = ":".join(body.split())
         name, colon, argument = body.partition(":")
         if name not in _PARSERS or (at and not frame) or (colon and not argument):
             raise ModeError(f"mode: expected one of {', '.join(_PARSERS)}, got {text!r}")

@@ -5,8 +5,9 @@ where an infinite bound is an absent side. Multipliers satisfy ``H x + g + A'y +
 negative entry of z or z_box means that the lower side is active. Whatever a backend claims, its answer is
 judged by residuals computed here.
 
-A backend is added with one file and one line in `registry`, or from outside with an entry point in the group
-``kinqp.solvers``, or unregistered as an instance, a class, or ``"module:Class"``.
+Every solver that qpsolvers or cvxpy finds installed answers to ``qpsolvers:<name>`` and ``cvxpy:<NAME>``. A backend is
+added with one file and one line in `registry`, or from outside with an entry point in the group ``kinqp.solvers``, or
+unregistered as an instance, a class, or ``"module:Class"``.
 """
 
 from .certificates import (

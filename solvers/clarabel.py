@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .validation import Array
 
 #: Clarabel's own words. "Almost" means that only its reduced tolerances (1e-4 and worse) were met.
-_STATUS = {
+STATUSES = {
     "Solved": Status.SOLVED,
     "AlmostSolved": Status.INACCURATE,
     "InsufficientProgress": Status.INACCURATE,
@@ -143,7 +143,7 @@ class Clarabel(Solver):
     def _solve(self, qp: QP) -> RawSolution:
         answer = self._backend.solve()
         word = str(answer.status)
-        claimed = _STATUS.get(word, Status.FAILED)
+        claimed = STATUSES.get(word, Status.FAILED)
         # Both sides of a row add up in its one multiplier.
         weights = self._sign * np.array(answer.z)
         # With weights bincount adds floats, which its stubs do not know; the conversion copies nothing.

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
 
 class OptionError(ValueError):
@@ -41,12 +41,25 @@ def count(name: str, value: int) -> int:
     return value
 
 
+def flag(name: str, value: object) -> bool:
+    """Return `value` if it is true or false, also as 1 or 0 or in words, else raise `OptionError`."""
+    choice = {"true": True, "1": True, "false": False, "0": False}.get(str(value).lower())
+    if choice is None:
+        raise OptionError(f"{name} must be true or false, but is {value!r}.")
+    return choice
+
+
 def unknown(what: str, name: str, choices: Iterable[str]) -> str:
     """Write the sentence that rejects a name, with the choices and, if there is one, the likely intention."""
     names = sorted(choices)
-    close = difflib.get_close_matches(name, names, n=1)
-    hint = f" (did you mean {close[0]!r}?)" if close else ""
-    return f"{what} {name!r} does not exist{hint}; the choices are {', '.join(names) or 'none'}."
+    return f"{what} {name!r} does not exist{hint(name, names)}; the choices are {', '.join(names) or 'none'}."
+
+
+def hint(name: str, choices: Iterable[str]) -> str:
+    """Write the likely intention behind a wrong name, upper and lower case aside; empty where there is none."""
+    folded = {choice.casefold(): choice for choice in choices}
+    close = difflib.get_close_matches(name.casefold(), folded, n=1)
+    return f" (did you mean {folded[close[0]]!r}?)" if close else ""
 
 
 def apply_settings(solver: str, target: object, settings: Mapping[str, object]) -> None:
@@ -67,3 +80,22 @@ def apply_settings(solver: str, target: object, settings: Mapping[str, object]) 
             setattr(target, name, value)
         except (TypeError, ValueError) as error:
             raise OptionError(f"{solver} does not accept {value!r} for its setting {name}: {error}.") from error
+
+
+def tried(solver: str, settings: Mapping[str, object], attempt: Callable[[], object]) -> None:
+    """Refuse settings with which a backend cannot be called, where it does not say beforehand which ones it has.
+
+    Raises
+    ------
+    OptionError
+        With the backend's own words.
+    """
+    try:
+        attempt()
+    except Exception as error:
+        raise OptionError(f"{solver} does not accept the settings {dict(settings)}: {one_line(error)}") from error
+
+
+def one_line(error: Exception) -> str:
+    """Return what an exception says, on one line."""
+    return " ".join(str(error).split()) or type(error).__name__

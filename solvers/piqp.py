@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from .qp import QP
 
-_STATUS = {
+STATUSES = {
     "PIQP_SOLVED": Status.SOLVED,
     "PIQP_MAX_ITER_REACHED": Status.MAX_ITERATIONS,
     "PIQP_PRIMAL_INFEASIBLE": Status.PRIMAL_INFEASIBLE,
@@ -90,7 +90,7 @@ class Piqp(Solver):
 
     def _solve(self, qp: QP) -> RawSolution:  # noqa: ARG002 - PIQP holds the data already
         word = self._backend.solve().name
-        claimed = _STATUS.get(word, Status.FAILED)
+        claimed = STATUSES.get(word, Status.FAILED)
         result = self._backend.result
         y, z, z_box = result.y, result.z_u - result.z_l, result.z_bu - result.z_bl
         certificate: FarkasCertificate | UnboundedRay | None = None

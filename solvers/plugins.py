@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import inspect
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from .options import UnknownOptionError, unknown
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
 
 T = TypeVar("T")
 
@@ -34,19 +37,23 @@ class Registry(Generic[T]):
         What they make.
     builtin
         The library's own, by name: a subclass of `base`, or a function that returns one.
+    families
+        What finds the same behind ``family:member``, by the name before the colon; such a family hides a module of
+        its name from ``module:Name``.
     """
 
     kind: str
     group: str
     base: type[T]
     builtin: dict[str, object]
+    families: Mapping[str, Callable[[str], object]] = field(default_factory=dict)
 
     def names(self) -> tuple[str, ...]:
         """Names of the built-in ones and of those that installed packages offer, sorted."""
         return tuple(sorted({*self.builtin, *(entry.name for entry in entry_points(group=self.group))}))
 
     def find(self, name: str) -> object:
-        """Return the class or function behind a registered name or ``module:Name``.
+        """Return the class or function behind a registered name, ``family:member`` or ``module:Name``.
 
         Raises
         ------
@@ -58,10 +65,14 @@ class Registry(Generic[T]):
         try:
             if ":" in name:
                 module, _, attribute = name.partition(":")
+                if module in self.families:
+                    return self.families[module](attribute)
                 return getattr(import_module(module), attribute)
             for entry in entry_points(group=self.group):
                 if entry.name == name:
                     return entry.load()
+        except PluginError:
+            raise
         except (ImportError, AttributeError, ValueError) as error:
             raise PluginError(f"{self.kind} {name!r}: it cannot be loaded: {error}") from error
         raise PluginError(unknown(self.kind, name, self.names()))

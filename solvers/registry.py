@@ -5,6 +5,9 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, TypeGuard
 
+from . import cvxpy_bridge, qpsolvers_bridge
+from .active_set import ActiveSet
+from .casadi_qrqp import CasadiQrqp
 from .clarabel import Clarabel
 from .piqp import Piqp
 from .plugins import PluginError, Registry, parse_spec
@@ -16,17 +19,32 @@ if TYPE_CHECKING:
     from .solution import Solution
 
 _BUILTIN: tuple[type[Solver], ...] = (
+    ActiveSet,
     ThesisActiveSet,
     Clarabel,
     Piqp,
+    CasadiQrqp,
+)
+
+#: Bridges to the solvers of other libraries, as ``family:member``.
+_FAMILIES = (
+    qpsolvers_bridge.FAMILY,
+    cvxpy_bridge.FAMILY,
 )
 
 #: Installed packages offer more solvers in this entry-point group, as ``name = "module:Class"``.
 ENTRY_POINT_GROUP = "kinqp.solvers"
 
 
-def available_solvers() -> tuple[str, ...]:
-    """Names of the installed solvers, sorted; built-in ones win over entry points of the same name."""
+def available_solvers(*, bridges: bool = False) -> tuple[str, ...]:
+    """Names of the installed solvers, sorted; built-in ones win over entry points of the same name.
+
+    Parameters
+    ----------
+    bridges
+        Whether to add the solvers behind other libraries, such as ``qpsolvers:daqp`` and ``cvxpy:OSQP``. This imports
+        those libraries, which takes seconds.
+    """
     registry = _registry()
     names = []
     for name in registry.names():
@@ -37,7 +55,9 @@ def available_solvers() -> tuple[str, ...]:
             continue
         if _is_solver(cls) and cls.available():
             names.append(name)
-    return tuple(names)
+    if bridges:
+        names += [name for family in _FAMILIES for name in family.names()]
+    return tuple(sorted(names))
 
 
 def get_solver(solver: str | Solver | type[Solver], /, **options: object) -> Solver:
@@ -46,8 +66,8 @@ def get_solver(solver: str | Solver | type[Solver], /, **options: object) -> Sol
     Parameters
     ----------
     solver
-        A registered name or ``"module:Class"``, optionally with options in brackets as in
-        ``"clarabel(tolerance=1e-8)"``; a class; or an instance, which is returned as it is.
+        A registered name, a bridged one as ``"qpsolvers:daqp"``, or ``"module:Class"``, optionally with options in
+        brackets as in ``"clarabel(tolerance=1e-8)"``; a class; or an instance, which is returned as it is.
     **options
         Keyword arguments of the solver's constructor.
 
@@ -83,7 +103,7 @@ def get_solver(solver: str | Solver | type[Solver], /, **options: object) -> Sol
     return registry.make(spec, **options)
 
 
-def solve(qp: QP, solver: str | Solver | type[Solver] = "clarabel", **options: object) -> Solution:
+def solve(qp: QP, solver: str | Solver | type[Solver] = "active-set", **options: object) -> Solution:
     """Solve one QP; for a series of them, keep the solver from `get_solver` and call its `solve`."""
     return get_solver(solver, **options).solve(qp)
 
@@ -91,7 +111,8 @@ def solve(qp: QP, solver: str | Solver | type[Solver] = "clarabel", **options: o
 def _registry(*unregistered: type[Solver]) -> Registry[Solver]:
     classes = {cls.name: cls for cls in (*_BUILTIN, *unregistered)}
     # Registry uses its base for isinstance alone, so an abstract one is safe here.
-    return Registry("solver", ENTRY_POINT_GROUP, Solver, classes)  # type: ignore[type-abstract, arg-type]
+    families = {family.name: family.find for family in _FAMILIES}
+    return Registry("solver", ENTRY_POINT_GROUP, Solver, classes, families)  # type: ignore[type-abstract, arg-type]
 
 
 def _is_solver(cls: object) -> TypeGuard[type[Solver]]:

@@ -11,7 +11,7 @@ def test_default_is_the_thesis_experiment() -> None:
     config = load_config()
     assert config.scenarios == ("semicircle",)
     assert config.formulations == ("cartesian-error", "joint-space")
-    assert config.solvers == ("thesis-active-set", "clarabel", "piqp")
+    assert config.solvers == ("active-set", "thesis-active-set", "clarabel", "piqp")
 
 
 def test_a_file_is_read(tmp_path: Path) -> None:

@@ -116,3 +116,16 @@ def test_ctrl_c_keeps_the_runs_done(tmp_path: Path) -> None:
     assert "--resume" in stdout
     assert "Traceback" not in stderr
     assert list(out.glob("cells/*.parquet"))
+
+
+def test_export_writes_a_folder_and_says_what_next(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ("--formulation", "cartesian-error", "--mode", "line z", "--out", out)
+    done = kinqp("export", "--robot", "lbr_med14", *options)
+    assert done.returncode == 0, done.stderr
+    assert "ctest --test-dir" in done.stdout.replace("\n", " ")
+    assert (out / "kinqp_lbr_med14_cartesian_error.c").exists()
+    wrong = kinqp("export", "--robot", "lbr_med41", *options)
+    assert wrong.returncode == 2
+    assert "lbr_med14" in wrong.stderr
+    assert "Traceback" not in wrong.stderr

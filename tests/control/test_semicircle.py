@@ -10,7 +10,9 @@ from kinqp.control import Trajectory, make_step, simulate
 from kinqp.solvers import Status
 
 ELBOW = 3
-CASES = [(f, s) for f in ("cartesian-error", "joint-space") for s in ("thesis-active-set", "clarabel", "piqp")]
+CASES = [
+    (f, s) for f in ("cartesian-error", "joint-space") for s in ("active-set", "thesis-active-set", "clarabel", "piqp")
+]
 
 
 @cache
@@ -94,11 +96,11 @@ def test_arm_never_stops_while_the_hand_pulls_along_the_limit(formulation: str, 
 
 
 @pytest.mark.parametrize("formulation", ["cartesian-error", "joint-space"])
-@pytest.mark.parametrize("solver", ["clarabel", "piqp"])
+@pytest.mark.parametrize("solver", ["active-set", "clarabel", "piqp"])
 def test_solvers_give_the_same_commands(formulation: str, solver: str) -> None:
     reference = run(formulation, "thesis-active-set")
     # PIQP stops on a duality gap of 1e-9, which leaves 2e-5 rad/s where a row is on the verge of becoming active.
-    tolerance = {"clarabel": 1e-6, "piqp": 1e-4}[solver]
+    tolerance = {"active-set": 1e-9, "clarabel": 1e-6, "piqp": 1e-4}[solver]
     np.testing.assert_allclose(run(formulation, solver).qd, reference.qd, rtol=0, atol=tolerance)
 
 

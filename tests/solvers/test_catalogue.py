@@ -9,6 +9,11 @@ from kinqp.solvers.catalogue import CATALOGUE, KnownQP
 # What a solver is known to get wrong: problem -> (what it claims, what we make of it). Whoever repairs one of these
 # will find the test failing, and removes the line. Solvers without a line here must get everything right.
 KNOWN_FAILURES: dict[str, dict[str, tuple[Status, Status] | None]] = {
+    # It has no word for a problem without a solution, and takes small pivots for a singular system.
+    "casadi-qrqp": dict.fromkeys(
+        ("dependent-equalities", "tiny-row", "infeasible-rows", "infeasible-equality", "unbounded"),
+        (Status.FAILED, Status.FAILED),
+    ),
     "thesis-active-set": {
         "dependent-rows-at-start": (Status.FAILED, Status.FAILED),
         "dependent-equalities": (Status.FAILED, Status.FAILED),

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from kinqp.solvers import QP, available_solvers, get_solver
 
-# Strictly convex problems with a feasible start and rows in general position are within reach of every solver.
-SOLVERS = available_solvers()
+# Strictly convex problems with a feasible start and rows in general position are within reach of every solver, but for
+# one that runs in circles, see test_casadi_qrqp.py.
+SOLVERS = tuple(name for name in available_solvers() if name != "casadi-qrqp")
 
 
 def random_qp(seed: int, n: int, m_eq: int, m: int, box: bool) -> QP:

@@ -179,7 +179,9 @@ def test_update_gives_the_answer_of_a_fresh_set_up(name: str) -> None:
     for seed in range(25):
         qp = control_problem(seed)
         updated, fresh = reused.solve(qp), get_solver(name).solve(qp)
-        assert updated.solved, updated.message
+        assert updated.status is fresh.status
+        if name == "casadi-qrqp" and not fresh.solved:
+            continue  # it runs in circles on some of these, see test_casadi_qrqp.py
         assert fresh.solved, fresh.message
         for field in ("x", "y", "z", "z_box"):
             np.testing.assert_allclose(getattr(updated, field), getattr(fresh, field), rtol=1e-6, atol=1e-6)

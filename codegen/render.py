@@ -1,0 +1,96 @@
+"""The C text of a step, from strict templates."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import jinja2
+
+from ..solvers.active_set import fixed_size_sources
+
+if TYPE_CHECKING:
+    from .model import StepCode
+
+_INCLUDE = re.compile(r'^#include "([^"]+)"\n', flags=re.MULTILINE)
+
+
+def library_version() -> str:
+    """The version that generated code names as its origin."""
+    try:
+        return version("kinqp")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def environment() -> jinja2.Environment:
+    """Jinja2 with undefined names as errors."""
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(_template_text),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # noqa: S701  # the output is C, not HTML
+    )
+
+
+def render_step(code: StepCode) -> dict[str, str]:
+    """Fill in header and source.
+
+    Returns
+    -------
+    dict of str to str
+        File name to content: ``<prefix>.h`` and ``<prefix>.c``, which need nothing but the C library.
+    """
+    sources = fixed_size_sources()
+    header = sources["kinqp_status.h"]
+    solver_header = _INCLUDE.sub("", sources["kinqp_as.h"])
+    solver_source = _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources)
+    values = {
+        "p": code.prefix,
+        "title": f"{code.formulation} on {code.robot}: {', '.join(mode.text for mode in code.modes)}",
+        "summary": "One control cycle of a hand-guided arm: joint positions and hand velocity in, joint rates out.",
+        "version": library_version(),
+        "status_header": header,
+        "math_header": _template_text("kinqp_math.h"),
+        "solver_header": solver_header,
+        "solver_source": solver_source,
+        "sizes": [{"n": n, "m": m} for n, m in code.sizes],
+        "largest": max(n for n, _ in code.sizes),
+        "modes": code.modes,
+        "dense": any(not mode.diagonal for mode in code.modes),
+        "equalities": any(mode.m_eq for mode in code.modes),
+        "most_equalities": max(mode.m_eq for mode in code.modes),
+        "parameters": code.parameters,
+        "inputs": code.inputs,
+        "nv": code.nv,
+        "m_free": code.m_free,
+        "rows": code.rows,
+        "max_iterations": code.max_iterations,
+    }
+    templates = environment()
+    return {
+        f"{code.prefix}.h": templates.get_template("step.h.j2").render(values),
+        f"{code.prefix}.c": templates.get_template("step.c.j2").render(values),
+    }
+
+
+def render_batch(code: StepCode) -> str:
+    """Fill in the function that Python calls for many ticks at once."""
+    values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
+    return environment().get_template("batch.c.j2").render(values)
+
+
+def _template_text(name: str) -> str:
+    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
+
+
+def _keep_instantiated(match: re.Match[str]) -> str:
+    return match[0] if match[1].endswith(".inc") else ""
+
+
+def _flatten(text: str, sources: dict[str, str]) -> str:
+    return _INCLUDE.sub(lambda match: sources.get(match[1], match[0]), text)

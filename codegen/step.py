@@ -1,0 +1,345 @@
+"""A formulation compiled: the C that is exported, loaded into Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from ..formulations import InputError, Mode, check_input, get_formulation
+from ..solvers import Status
+from ..solvers.native import build_library, declarations
+from .model import identifier, step_code
+from .render import render_batch, render_step
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..formulations import Formulation, Input
+    from ..robots import Robot
+    from .model import StepCode
+
+    Array = NDArray[np.float64]
+    Integers = NDArray[np.intc]
+
+# In the order of kinqp_status.
+STATUSES: Final = (
+    Status.SOLVED,
+    Status.MAX_ITERATIONS,
+    Status.PRIMAL_INFEASIBLE,
+    Status.DUAL_INFEASIBLE,
+    Status.INACCURATE,
+    Status.FAILED,
+)
+SOLVER: Final = "active-set"
+
+
+@dataclass(frozen=True, slots=True)
+class TickResult:
+    """The command of one control cycle.
+
+    Attributes
+    ----------
+    qd : ndarray, shape (nv,)
+        Joint velocity command [rad/s or m/s]; zero (the safe stop) unless `status` is SOLVED, or MAX_ITERATIONS of a
+        step that keeps to admissible points.
+    eps : ndarray, shape (m_free,)
+        Cartesian error J_free qd - v [m/s, rad/s].
+    status : Status
+    iterations : int
+        Active-set steps.
+    sides : ndarray of int, shape (rows,)
+        -1, 0 or +1 for each row: which of its sides holds the command back.
+    rows : tuple of str
+        Names of the rows.
+    """
+
+    qd: Array
+    eps: Array
+    status: Status
+    iterations: int
+    sides: Integers
+    rows: tuple[str, ...]
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Names of the rows that hold the command back, with their side: "joint limits[3] upper"."""
+        return tuple(
+            f"{name} {'upper' if side > 0 else 'lower'}"
+            for name, side in zip(self.rows, self.sides, strict=True)
+            if side
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BatchResult:
+    """The commands of many control cycles.
+
+    Attributes
+    ----------
+    qd : ndarray, shape (N, nv)
+        [rad/s or m/s].
+    eps : ndarray, shape (N, m_free)
+        [m/s, rad/s].
+    codes : ndarray of int, shape (N,)
+        Status by number, 0 being SOLVED; see `status`.
+    iterations : ndarray of int, shape (N,)
+    sides : ndarray of int, shape (N, rows)
+        As in `TickResult`.
+    rows : tuple of str
+        Names of the rows.
+    """
+
+    qd: Array
+    eps: Array
+    codes: Integers
+    iterations: Integers
+    sides: Integers
+    rows: tuple[str, ...]
+
+    @property
+    def status(self) -> tuple[Status, ...]:
+        """Status of each tick."""
+        return tuple(STATUSES[code] for code in self.codes)
+
+
+class CompiledStep:
+    """A formulation on a robot in a mode as compiled C; `compile_step` makes one.
+
+    The command of a state depends on that state alone, bit for bit. Not to be shared between threads.
+
+    Parameters
+    ----------
+    robot : Robot
+    formulation : Formulation
+    mode : Mode
+    feasible : bool
+        Keep to admissible points: a tick that reaches `max_iterations` still gives a usable command.
+    max_iterations : int, optional
+        Cap on active-set steps of a tick; generous unless told otherwise.
+
+    Raises
+    ------
+    CompilerError
+        When there is no C compiler, or it fails.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        formulation: Formulation,
+        mode: Mode,
+        *,
+        feasible: bool = False,
+        max_iterations: int | None = None,
+    ) -> None:
+        import cffi
+
+        self.robot: Final = robot
+        self.formulation: Final = formulation
+        self.mode: Final = mode
+        prefix = identifier(f"kinqp_{robot.name}_{formulation.name}")
+        code = step_code(robot, formulation, [mode], prefix)
+        self.code: Final[StepCode] = code
+        files = render_step(code)
+        batch = render_batch(code)
+        ffi = cffi.FFI()
+        prototype = "void " + batch.partition("void ")[2].partition(";")[0] + ";"
+        ffi.cdef(declarations(files[f"{prefix}.h"]) + "\n" + prototype)
+        library = build_library(prefix, files | {f"{prefix}_batch.c": batch}, flags=STEP_FLAGS)
+        self._ffi: Final = ffi
+        self._library: Final = ffi.dlopen(str(library))
+        self._run: Final = getattr(self._library, f"{prefix}_step")
+        self._run_batch: Final = getattr(self._library, f"{prefix}_batch")
+        self._parameters: Final = ffi.new(f"{prefix}_parameters *")
+        getattr(self._library, f"{prefix}_default_parameters")(self._parameters)
+        self._parameters.feasible = int(feasible)
+        if max_iterations is not None:
+            if max_iterations < 0:
+                raise ValueError(f"max_iterations: expected a count that is not negative, got {max_iterations}")
+            self._parameters.max_iterations = max_iterations
+        self._input: Final = ffi.new(f"{prefix}_input *")
+        self._output: Final = ffi.new(f"{prefix}_output *")
+        self._specs: Final[dict[str, Input]] = {given.name: given for given in code.modes[0].inputs}
+        self._required: Final = {name for name, given in self._specs.items() if given.default is None} - {"q", "v"}
+        # Inputs without entries have no field.
+        self._signals: Final = {name: np.zeros(0) for name, given in self._specs.items() if not given.size}
+        self._signals.update({field.name: self._view(self._input, field.name) for field in code.inputs})
+        self._fields: Final = {field.name: self._parameter_view(field.name) for field in code.parameters}
+        self._qd: Final = self._view(self._output, "qd")
+        self._eps: Final = self._view(self._output, "eps")
+        self._sides: Final = self._view(self._output, "active", np.dtype(np.intc))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the run-time inputs, beyond `q` and `v`, that a call takes by keyword."""
+        return tuple(name for name in self._specs if name not in ("q", "v"))
+
+    def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> TickResult:
+        """Compute the command.
+
+        Parameters
+        ----------
+        q : array_like, shape (nv,)
+            Joint positions [rad or m].
+        v : array_like, shape (m_free,)
+            Velocity that the hand asks for, along the mode's axes [m/s, rad/s].
+        **inputs : array_like
+            Any of `inputs`, for this call only.
+
+        Raises
+        ------
+        InputError
+            Naming the input that is unknown, missing, of the wrong shape, not finite or out of range.
+        """
+        self._signals["q"][:] = check_input(self._specs["q"], q, self.mode)
+        self._signals["v"][:] = check_input(self._specs["v"], v, self.mode)
+        restore = self._override(inputs) if inputs or self._required else None
+        try:
+            code = self._run(self._parameters, self._input, self._output)
+        finally:
+            if restore:
+                for values, before in restore:
+                    values[:] = before
+        return TickResult(
+            self._qd.copy(),
+            self._eps.copy(),
+            STATUSES[code],
+            self._output.iterations,
+            self._sides.copy(),
+            self.code.modes[0].rows,
+        )
+
+    def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> BatchResult:
+        """Compute the commands of many states in one call into C.
+
+        Parameters
+        ----------
+        Q : array_like, shape (N, nv)
+            Joint positions [rad or m].
+        V : array_like, shape (N, m_free)
+            Velocities that the hand asks for [m/s, rad/s].
+        **inputs : array_like
+            Parameters (limits, weights, `dt`), the same for all states.
+
+        Raises
+        ------
+        InputError
+            Naming the input that is not usable. A state that isn't finite refuses its own tick only, whose status is
+            FAILED.
+        """
+        states = np.ascontiguousarray(Q, dtype=float)
+        twists = np.ascontiguousarray(V, dtype=float)
+        shapes = (len(states), self.robot.nv), (len(states), self.mode.m_free)
+        for name, values, shape in (("Q", states, shapes[0]), ("V", twists, shapes[1])):
+            if values.shape != shape:
+                raise InputError(f"{name}: expected shape {shape}, got {values.shape}")
+        for name in inputs:
+            if name in self._signals:
+                raise InputError(f"{name}: expected parameters, the same for all states, got an input of single ticks")
+        for name in self._required:
+            if name in self._signals:
+                raise InputError(f"{name}: expected single calls where this is new at every tick, got a batch")
+        count, rows = len(states), self.code.rows
+        result = BatchResult(
+            np.empty_like(states),
+            np.empty_like(twists),
+            np.empty(count, dtype=np.intc),
+            np.empty(count, dtype=np.intc),
+            np.empty((count, rows), dtype=np.intc),
+            self.code.modes[0].rows,
+        )
+        restore = self._override(inputs)
+        try:
+            doubles = [self._pointer("double *", x) for x in (states, twists, result.qd, result.eps)]
+            integers = [self._pointer("int *", x) for x in (result.codes, result.iterations, result.sides)]
+            self._run_batch(self._parameters, 0, count, *doubles, *integers)
+        finally:
+            for values, before in restore:
+                values[:] = before
+        return result
+
+    def _override(self, inputs: dict[str, ArrayLike]) -> list[tuple[Array, Array]]:
+        checked: list[tuple[Array, Array]] = []
+        for name, value in inputs.items():
+            if name not in self._specs or name in ("q", "v"):
+                raise InputError(f"{name}: expected an input among {', '.join(self.inputs)}, got {name!r}")
+            values = self._signals[name] if name in self._signals else self._fields[name]
+            checked.append((values, np.broadcast_to(check_input(self._specs[name], value, self.mode), values.shape)))
+        for name in self._required:
+            if name not in inputs:
+                raise InputError(f"{name}: expected shape ({self._specs[name].size},), got nothing")
+        self._check_limits(inputs)
+        restore = [(values, values.copy()) for values, _ in checked]
+        for values, new in checked:
+            values[:] = new
+        return restore
+
+    def _check_limits(self, inputs: dict[str, ArrayLike]) -> None:
+        if not ("q_min" in inputs or "q_max" in inputs) or not {"q_min", "q_max"} <= self._fields.keys():
+            return
+        low, high = (np.asarray(inputs.get(name, self._fields[name]), dtype=float) for name in ("q_min", "q_max"))
+        if (low > high).any():
+            raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
+
+    def _pointer(self, kind: str, values: NDArray[Any]) -> Any:
+        return self._ffi.cast(kind, self._ffi.from_buffer(values)) if values.size else self._ffi.NULL
+
+    def _view(self, struct: Any, name: str, kind: np.dtype[Any] | None = None) -> Any:
+        return np.frombuffer(self._ffi.buffer(getattr(struct, name)), dtype=kind or np.float64)
+
+    def _parameter_view(self, name: str) -> Any:
+        address = self._ffi.addressof(self._parameters[0], name)
+        size = self._ffi.sizeof(self._ffi.typeof(address).item)
+        return np.frombuffer(self._ffi.buffer(address, size), dtype=np.float64)
+
+
+def compile_step(
+    robot: Robot,
+    formulation: str | Formulation,
+    mode: str | Mode,
+    solver: str = SOLVER,
+    *,
+    feasible: bool = False,
+    max_iterations: int | None = None,
+) -> CompiledStep:
+    """Compile the control cycle of a formulation on a robot in a mode.
+
+    The first time this takes some seconds of the system's C compiler; after that the library is found in a cache by its
+    content.
+
+    Parameters
+    ----------
+    robot : Robot
+        From `load_robot`.
+    formulation : str or Formulation
+        A registered name, `module:Name`, or an instance.
+    mode : str or Mode
+        As in `Mode.parse`, or an instance.
+    solver : {"active-set"}
+        The solver in the C code.
+    feasible, max_iterations
+        See `CompiledStep`.
+
+    Raises
+    ------
+    ValueError
+        When the solver has no C counterpart.
+    CompilerError
+        When there is no C compiler, or it fails.
+    """
+    if solver != SOLVER:
+        raise ValueError(f"solver: expected {SOLVER!r}, the one that is generated as C, got {solver!r}; see make_step")
+    return CompiledStep(
+        robot,
+        get_formulation(formulation),
+        Mode.parse(mode) if isinstance(mode, str) else mode,
+        feasible=feasible,
+        max_iterations=max_iterations,
+    )
+
+
+STEP_FLAGS: Final = (
+    "-std=c99", "-O3", "-fno-tree-slp-vectorize", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-shared", "-lm",
+)  # fmt: skip

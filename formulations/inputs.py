@@ -1,0 +1,48 @@
+"""Checks of a step's run-time inputs: every mistake is one sentence that names the input."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from .modes import Mode
+    from .tick import Input
+
+    Array = NDArray[np.float64]
+
+
+class InputError(ValueError):
+    """A run-time input of a step has the wrong shape, size or value; the message names it."""
+
+
+def check_input(spec: Input, given: ArrayLike, mode: Mode) -> Array:
+    """Return an input's value as float64, shape (size,) or, where it has a default, () for all entries alike.
+
+    Raises
+    ------
+    InputError
+        Naming the input, what was expected and what was got.
+    """
+    try:
+        value = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got {given!r}") from None
+    if value.shape != (spec.size,) and not (spec.default is not None and value.ndim == 0):
+        raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got shape {value.shape}")
+    if not np.isfinite(value).all() and (not spec.may_be_infinite or np.isnan(value).any()):
+        raise InputError(f"{spec.name}: expected finite numbers, got {value}")
+    if spec.lowest > -np.inf and ((value < spec.lowest).any() or (spec.positive and (value <= spec.lowest).any())):
+        bound = "above" if spec.positive else "not below"
+        raise InputError(f"{spec.name}: expected numbers {bound} {spec.lowest:g} {spec.unit}, got {value}")
+    return value
+
+
+def describe_input(spec: Input, mode: Mode) -> str:
+    """Say what an input must look like."""
+    if spec.name == "v":
+        return f"shape ({spec.size},) for mode {mode} (rows {', '.join(mode.free_names)})"
+    return f"shape ({spec.size},) [{spec.unit}]"

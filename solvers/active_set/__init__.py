@@ -1,0 +1,9 @@
+"""The library's own active-set solver: portable C that allocates nothing, and its Python backend.
+
+The C is plain C99 and can be used without Python; ``docs/active-set.md`` says how.
+"""
+
+from .library import fixed_size_sources, sources
+from .solver import ActiveSet
+
+__all__ = ["ActiveSet", "fixed_size_sources", "sources"]

@@ -1,0 +1,191 @@
+"""Building C at run time: sources to a shared library, with the system's compiler, once per machine.
+
+Libraries are kept in a cache, ``$KINQP_CACHE`` or else ``$XDG_CACHE_HOME/kinqp`` or ``~/.cache/kinqp``, under a hash of
+everything that decides what they contain. A file appears there finished and in one step, with its own checksum at the
+end, so any number of processes may build and load at once, and a damaged file is noticed and replaced.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+#: ``-ffp-contract=off``: the same bits whether or not the machine can fuse a multiplication with an addition.
+#: ``-fno-tree-slp-vectorize``: at three to seven columns, packing scalars into vectors costs more than it saves.
+DEFAULT_FLAGS: tuple[str, ...] = (
+    "-std=c99",
+    "-O3",
+    "-fno-tree-slp-vectorize",
+    "-ffp-contract=off",
+    "-fPIC",
+    "-shared",
+    "-lm",
+)
+
+_COMPILERS = ("cc", "gcc", "clang")
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+#: Lines of the compiler's own words in an error message.
+_MESSAGE_LINES = 12
+
+
+class CompilerError(RuntimeError):
+    """There is no C compiler, it refused the sources, or there is no place to keep what it made."""
+
+
+def build_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str] = DEFAULT_FLAGS) -> Path:
+    """Compile C sources into one shared library, or find the one that was made from them before.
+
+    Parameters
+    ----------
+    name
+        What the library is called, for people who look into the cache.
+    sources
+        Text by file name; every ``.c`` among them is compiled, the others are there to be included.
+    flags
+        Passed to the compiler in this order, libraries (``-l...``) behind the sources.
+
+    Returns
+    -------
+    Path
+        The library's absolute path; its content belongs to these sources, flags and this compiler for ever.
+
+    Raises
+    ------
+    CompilerError
+        When there is no compiler, it fails, or the cache cannot be written.
+    ValueError
+        When a name is no plain file name, or nothing among the sources is C.
+    """
+    for file in (name, *sources):
+        if not _NAME.fullmatch(file):
+            raise ValueError(f"build_library: expected plain file names, got {file!r}")
+    units = sorted(file for file in sources if file.endswith(".c"))
+    if not units:
+        raise ValueError(
+            f"build_library: expected at least one .c among the sources, got {', '.join(sources) or 'none'}"
+        )
+    command = compiler()
+    library = cache_directory() / f"{name}-{_key(sources, flags, command)}.so"
+    if _intact(library):
+        return library
+    try:
+        library.parent.mkdir(parents=True, exist_ok=True)
+        # In the same directory, because only there a file can be moved into place in one step.
+        with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=library.parent, ignore_cleanup_errors=True) as scratch:
+            made = _compile(Path(scratch), sources, units, flags, command)
+            made.replace(library)
+    except OSError as error:
+        raise CompilerError(
+            f"the C library {name!r} cannot be kept in {library.parent}: {error}; "
+            f"set KINQP_CACHE to a writable directory"
+        ) from error
+    return library
+
+
+def compiler() -> tuple[str, ...]:
+    """Return the command of the C compiler: ``$KINQP_CC`` with its arguments, else the first of cc, gcc, clang.
+
+    Raises
+    ------
+    CompilerError
+        When there is none.
+    """
+    wanted = shlex.split(os.environ.get("KINQP_CC", ""))
+    for candidate in wanted[:1] or _COMPILERS:
+        path = shutil.which(candidate)
+        if path is not None:
+            return (str(Path(path).absolute()), *wanted[1:])
+    missing = f"KINQP_CC names {wanted[0]!r}, which" if wanted else f"a C compiler ({', '.join(_COMPILERS)})"
+    raise CompilerError(
+        f"{missing} was not found: install a C compiler, e.g. apt-get install gcc, or set KINQP_CC to one"
+    )
+
+
+def cache_directory() -> Path:
+    """Return the directory in which libraries are kept; it need not exist."""
+    chosen = os.environ.get("KINQP_CACHE")
+    if chosen:
+        return Path(chosen).expanduser().absolute()
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    # The XDG specification wants relative paths ignored.
+    return (Path(base) if Path(base).is_absolute() else Path("~/.cache").expanduser()).absolute() / "kinqp"
+
+
+def declarations(header: str) -> str:
+    """Return what cffi can read of a C header: no comments, no preprocessor, no ``extern "C"``."""
+    text = re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
+    text = re.sub(r"#ifdef __cplusplus.*?#endif", "", text, flags=re.DOTALL)
+    return "\n".join(line for line in text.splitlines() if line.strip() and not line.startswith("#"))
+
+
+def _key(sources: Mapping[str, str], flags: Sequence[str], command: tuple[str, ...]) -> str:
+    parts = [*command, _version(command), platform.machine(), sys.platform, *flags]
+    for file in sorted(sources):
+        parts += [file, sources[file]]
+    digest = hashlib.sha256()
+    for part in parts:
+        data = part.encode()
+        # With its length in front, so that no two lists of parts run into the same bytes.
+        digest.update(b"%d:" % len(data) + data)
+    return digest.hexdigest()[:24]
+
+
+@cache
+def _version(command: tuple[str, ...]) -> str:
+    try:
+        answer = _run([*command, "--version"])
+    except OSError as error:
+        raise CompilerError(f"the C compiler {shlex.join(command)} cannot be run: {error}; set KINQP_CC") from error
+    return answer.stdout
+
+
+def _compile(
+    scratch: Path,
+    sources: Mapping[str, str],
+    units: Sequence[str],
+    flags: Sequence[str],
+    command: tuple[str, ...],
+) -> Path:
+    """Compile in the directory `scratch`; return the library, sealed."""
+    for file, text in sources.items():
+        (scratch / file).write_text(text, encoding="utf-8")
+    libraries = [flag for flag in flags if flag.startswith("-l")]
+    others = [flag for flag in flags if not flag.startswith("-l")]
+    # File names stay relative, because a compiler may write them into what it makes.
+    line = [*command, *others, *units, "-o", "library.so", *libraries]
+    answer = _run(line, scratch)
+    made = scratch / "library.so"
+    if answer.returncode != 0 or not made.is_file():
+        words = (answer.stderr or answer.stdout).strip().splitlines()[:_MESSAGE_LINES] or ["(it said nothing)"]
+        raise CompilerError(f"{shlex.join(line)} failed with code {answer.returncode}:\n" + "\n".join(words))
+    content = made.read_bytes()
+    made.write_bytes(content + hashlib.sha256(content).digest())
+    return made
+
+
+def _run(line: Sequence[str], directory: Path | None = None) -> subprocess.CompletedProcess[str]:
+    # What runs is the compiler that the user chose, with arguments in a list and without a shell.
+    return subprocess.run(line, cwd=directory, capture_output=True, text=True, errors="replace", check=False)
+
+
+def _intact(library: Path) -> bool:
+    """Whether a library ends in the checksum of what comes before, as `_compile` seals it (loaders do not mind)."""
+    try:
+        content = library.read_bytes()
+    except OSError:
+        return False
+    size = hashlib.sha256().digest_size
+    return hashlib.sha256(content[:-size]).digest() == content[-size:]
