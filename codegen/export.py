@@ -201,7 +201,8 @@ def _sizes(code: StepCode, files: dict[str, str]) -> dict[str, str]:
     signals = sum(field.size for field in code.inputs)
     integers = 4 * (code.rows + 2)
     sizes = {
-        "parameters": f"{8 * doubles + 8}",
+        # One more double, the transition, where there are modes to switch between.
+        "parameters": f"{8 * (doubles + (len(code.modes) > 1)) + 8}",
         "input": f"{8 * signals + 8}",
         "output": f"{8 * (code.nv + code.m_free) + integers + integers % 8}",
     }

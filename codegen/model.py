@@ -71,6 +71,7 @@ class ModeCode:
     n: int
     m: int
     m_free: int
+    m_fixed: int
     diagonal: bool
     gradient: bool
     start: bool
@@ -80,6 +81,7 @@ class ModeCode:
     h_size: int
     targets: tuple[str, ...]
     body: tuple[str, ...]
+    row_body: tuple[str, ...]
     finite: tuple[Field, ...]
     rows: tuple[str, ...]
     inputs: tuple[Input, ...]
@@ -97,7 +99,7 @@ class StepCode:
         For titles.
     nv : int
         Number of joints.
-    m_free, rows, max_iterations : int
+    m_free, m_fixed, rows, max_iterations : int
         The largest over the modes.
     parameters, inputs : tuple of Field
         Of the two structs; the largest size over the modes.
@@ -109,6 +111,7 @@ class StepCode:
     formulation: str
     nv: int
     m_free: int
+    m_fixed: int
     rows: int
     max_iterations: int
     parameters: tuple[Field, ...]
@@ -139,6 +142,7 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
         formulation=formulation.name,
         nv=robot.nv,
         m_free=max(code.m_free for code in codes),
+        m_fixed=max(code.m_fixed for code in codes),
         rows=max(code.m for code in codes),
         max_iterations=max(10 * (code.m + code.n) + 50 for code in codes),
         parameters=tuple(_field(given) for name, given in largest.items() if name not in _SIGNALS),
@@ -177,6 +181,9 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         for name, field in fields.items()
     ]
     mode = lowered.mode
+    tick = lowered.tick
+    angles = {f"in->q[{i}]": f"[{i}]" for i in range(tick.nv)}
+    rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
     return ModeCode(
         text=str(mode),
         symbol=identifier(str(mode).replace("-", "m") if "-" in mode.argument else str(mode)),
@@ -184,6 +191,7 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         n=reduced.n,
         m=reduced.m,
         m_free=mode.m_free,
+        m_fixed=mode.m_fixed,
         diagonal=diagonal,
         gradient=gradient,
         start=bool(reduced.start.size1()),
@@ -192,7 +200,8 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         command_offset=not reduced.k.is_zero(),
         h_size=reduced.n if diagonal else reduced.n**2,
         targets=tuple(outputs),
-        body=tuple(emit(function, sources, list(outputs), {f"in->q[{i}]": f"[{i}]" for i in range(lowered.robot.nv)})),
+        body=tuple(emit(function, sources, list(outputs), angles)),
+        row_body=tuple(emit(rows, ["q"], ["rows"], {f"q[{i}]": f"[{i}]" for i in range(tick.nv)})),
         finite=tuple(field for name, field in fields.items() if name in _SIGNALS and field.size),
         rows=reduced.rows,
         inputs=inputs,

@@ -68,6 +68,8 @@ def render_step(code: StepCode) -> dict[str, str]:
         "inputs": code.inputs,
         "nv": code.nv,
         "m_free": code.m_free,
+        "m_fixed": code.m_fixed,
+        "drift": any(field.name == "v_fixed" and field.size for field in code.inputs),
         "rows": code.rows,
         "max_iterations": code.max_iterations,
     }

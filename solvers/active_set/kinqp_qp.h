@@ -48,7 +48,7 @@ typedef struct {
     int passes;      /* out: outer passes [count] */
     double primal;   /* out: largest violation of a row, relative to its bound or its reach at x's length [-] */
     double dual;         /* out: largest stationarity residual in scaled variables, relative to the largest terms; or,
-                          * where worse, 2e-3 of it as given, relative to the largest of |H|, |Hx|, |g|, |A'y + ...| [-] */
+                          * where worse, 2e-3 of it as given, relative to the largest of |H|, |Hx|, |g|, |A'y..| [-] */
     double gap;      /* out: largest complementarity product, relative to the largest term of the objective [-] */
 } kinqp_qp_solution;
 
