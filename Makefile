@@ -7,12 +7,13 @@ BIN := $(VENV)/bin
 FOLDERS := robots solvers formulations codegen control benchmarks cli
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
-.PHONY: help bench test test-long lint format types clean
+.PHONY: help bench test test-long test-arm lint format types clean
 
 help:
 	@echo "make bench      the semicircle: formulations x solvers, one table (results in $(OUT)/)"
 	@echo "make test       the tests, under 5 minutes"
 	@echo "make test-long  the same tests with more states"
+	@echo "make test-arm   generated code and solver on 64- and 32-bit ARM, emulated (Debian packages: see the target)"
 	@echo "make lint       ruff"
 	@echo "make types      mypy --strict on the installed library"
 	@echo "make format     let ruff format the sources"
@@ -26,6 +27,10 @@ test: $(VENV)/.installed
 
 test-long: $(VENV)/.installed
 	$(BIN)/python -m pytest
+
+# apt-get install gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf libc6-dev-arm64-cross libc6-dev-armhf-cross qemu-user
+test-arm: $(VENV)/.installed
+	$(BIN)/python -m pytest tests/codegen/test_arm.py
 
 lint: $(VENV)/.dependencies
 	$(BIN)/ruff check .

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -25,8 +26,9 @@ def library_version() -> str:
         return "unknown"
 
 
+@cache
 def environment() -> jinja2.Environment:
-    """Jinja2 with undefined names as errors."""
+    """Jinja2 with undefined names as errors; one for all, since it keeps the templates that it has read."""
     return jinja2.Environment(
         loader=jinja2.FunctionLoader(_template_text),
         undefined=jinja2.StrictUndefined,

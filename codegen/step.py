@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..formulations import InputError, Mode, check_input, get_formulation
-from ..solvers import Status
+from ..solvers.active_set import STATUSES
 from ..solvers.native import build_library, declarations
 from .model import identifier, step_code
 from .render import render_batch, render_step
@@ -18,20 +18,12 @@ if TYPE_CHECKING:
 
     from ..formulations import Formulation, Input
     from ..robots import Robot
+    from ..solvers import Status
     from .model import StepCode
 
     Array = NDArray[np.float64]
     Integers = NDArray[np.intc]
 
-# In the order of kinqp_status.
-STATUSES: Final = (
-    Status.SOLVED,
-    Status.MAX_ITERATIONS,
-    Status.PRIMAL_INFEASIBLE,
-    Status.DUAL_INFEASIBLE,
-    Status.INACCURATE,
-    Status.FAILED,
-)
 SOLVER: Final = "active-set"
 
 

@@ -4,6 +4,6 @@ The C is plain C99 and can be used without Python; ``docs/active-set.md`` says h
 """
 
 from .library import fixed_size_sources, sources
-from .solver import ActiveSet
+from .solver import STATUSES, ActiveSet
 
-__all__ = ["ActiveSet", "fixed_size_sources", "sources"]
+__all__ = ["STATUSES", "ActiveSet", "fixed_size_sources", "sources"]

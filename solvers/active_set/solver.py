@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ..qp import QP
 
 #: In the order of ``kinqp_status``.
-_STATUS = (
+STATUSES = (
     Status.SOLVED,
     Status.MAX_ITERATIONS,
     Status.PRIMAL_INFEASIBLE,
@@ -122,7 +122,7 @@ class ActiveSet(Solver):
 
     def _solve(self, qp: QP) -> RawSolution:
         answer = self._answer
-        claimed = _STATUS[self._call(self._problem, self._options, self._memory, answer)]
+        claimed = STATUSES[self._call(self._problem, self._options, self._memory, answer)]
         if claimed is Status.SOLVED:
             return RawSolution(
                 claimed=claimed, x=self._x, y=self._y, z=self._z, z_box=self._z_box, iterations=answer.iterations
