@@ -136,7 +136,7 @@ def export_c(
 
 
 def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Recorded:
-    """Run every mode in closed loop through the interpreted path, from a state with every other joint close to its limit.
+    """Run every mode in closed loop through the interpreted path, from where every other joint is close to its limit.
 
     Ticks whose answer the solver itself doesn't vouch for are left out.
     """
