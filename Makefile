@@ -4,13 +4,16 @@ PYTHON ?= python3
 VENV ?= .venv
 OUT ?= results
 BIN := $(VENV)/bin
+# One worker per core, a file stays with one worker; pytest-benchmark has no place beside others.
+PARALLEL := -n auto --dist loadfile -p no:benchmark
 FOLDERS := robots solvers formulations codegen control benchmarks cli
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
-.PHONY: help bench test test-long test-arm lint format types clean
+.PHONY: help bench perf test test-long test-arm lint format types clean
 
 help:
 	@echo "make bench      the semicircle: formulations x solvers, one table (results in $(OUT)/)"
+	@echo "make perf       the generated tick beside DAQP and Pink, ratios against targets; every solver per solve"
 	@echo "make test       the tests, under 5 minutes"
 	@echo "make test-long  the same tests with more states"
 	@echo "make test-arm   generated code and solver on 64- and 32-bit ARM, emulated (Debian packages: see the target)"
@@ -22,11 +25,16 @@ help:
 bench: $(VENV)/.installed
 	$(BIN)/kinqp sweep --overwrite --out $(OUT)
 
+# Ratios first, then times per call. Not part of the tests: times are only worth something on a machine that is at rest.
+perf: $(VENV)/.installed $(VENV)/.perf
+	$(BIN)/python benchmarks/suite/ratios.py
+	$(BIN)/python -m pytest benchmarks/suite --benchmark-only
+
 test: $(VENV)/.installed
-	$(BIN)/python -m pytest -m "not long"
+	$(BIN)/python -m pytest -m "not long" $(PARALLEL)
 
 test-long: $(VENV)/.installed
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PARALLEL)
 
 # apt-get install gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf libc6-dev-arm64-cross libc6-dev-armhf-cross qemu-user
 test-arm: $(VENV)/.installed
@@ -57,6 +65,10 @@ $(VENV)/.installed: $(VENV)/.dependencies $(SOURCES)
 	$(BIN)/python -m pip wheel --quiet --constraint constraints.txt --no-deps --wheel-dir dist .
 	$(BIN)/python -m pip install --quiet --no-deps --force-reinstall dist/*.whl
 	@rm -rf build *.egg-info
+	@touch $@
+
+$(VENV)/.perf: $(VENV)/.dependencies | $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt "$$(echo dist/*.whl)[perf]"
 	@touch $@
 
 clean:

@@ -14,7 +14,7 @@ from kinqp.solvers.native import compiler
 from tests.robots.arms import arm
 
 FILES = {"CMakeLists.txt", "README.md", "main.c", "recorded.h"}
-STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off")
+STRICT = ("-std=c99", "-O0", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off")
 
 
 @cache

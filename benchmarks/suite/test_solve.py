@@ -1,0 +1,43 @@
+"""Each formulation's QPs by each of the library's solvers, per solve through the common interface."""
+
+import itertools
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kinqp.control import make_step
+from kinqp.solvers import QP, available_solvers, get_solver
+from measure.states import MODE, arm, near_limits
+
+ROUNDS = 200
+
+
+@cache
+def problems(formulation: str) -> tuple[QP, ...]:
+    states = near_limits(ROUNDS)
+    step = make_step(arm(), formulation, MODE)
+    return tuple(step.evaluate(q, v).qp for q, v in zip(states.q, states.v, strict=True))
+
+
+@pytest.mark.parametrize("solver", available_solvers())
+@pytest.mark.parametrize("formulation", ["cartesian-error", "joint-space"])
+def test_solve(benchmark, formulation, solver):
+    backend = get_solver(solver)
+    upcoming = itertools.cycle(problems(formulation))
+    solutions = []
+    benchmark.group = f"solve: {formulation}"
+    benchmark.pedantic(
+        lambda qp: solutions.append(backend.solve(qp)),
+        setup=lambda: ((next(upcoming),), {}),
+        rounds=ROUNDS,
+        warmup_rounds=5,
+    )
+    solutions = solutions[-ROUNDS:]
+    iterations = [solution.iterations for solution in solutions]
+    benchmark.extra_info |= {
+        "iterations mean": float(np.mean(iterations)),
+        "iterations max": int(np.max(iterations)),
+        "solved": sum(solution.solved for solution in solutions),
+        "backend's own time, median [us]": 1e6 * float(np.median([s.setup_time + s.solve_time for s in solutions])),
+    }
