@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import subprocess
 from dataclasses import dataclass
+from importlib.metadata import version
 from time import perf_counter_ns
 from typing import TYPE_CHECKING, Final
 
@@ -314,13 +316,19 @@ def _conditions(flags: Sequence[str], sets: Sequence[States], passes: int) -> st
     clock = TimedTick(arm(), FORMULATIONS[0], MODE, sets[0], WHOLE)
     lines = [
         f"{found['cpu']}, {found['cores']} cores, load average {_load()}; {found['system']}; {found['date']}",
-        f"{' '.join(compiler())} {' '.join((compiler_flags(), *flags))}; Python {found['python']}",
+        f"{_compiler()}: {' '.join((compiler_flags(), *flags))}",
+        f"Python {found['python']}, numpy {found['numpy']}, daqp {version('daqp')}, pin-pink {version('pin-pink')}",
         f"{ROBOT}, {MODE}; {', '.join(f'{len(s.q)} {s.name}' for s in sets)} states",
         f"{REPEATS} interleaved repeats, minimum of {passes} passes per state",
         f"clock: {clock.cost * clock.unit:.0f} ns, taken off our times; "
         f"clock_gettime: {clock.gettime_cost():.0f} ns, inside the times that DAQP reports",
     ]
     return "\n".join(lines)
+
+
+def _compiler() -> str:
+    answer = subprocess.run([*compiler(), "--version"], capture_output=True, text=True, check=True)
+    return answer.stdout.splitlines()[0]
 
 
 def _load() -> str:
