@@ -103,10 +103,7 @@ def export_c(
     recorded = record(robot, made, parsed)
     templates = environment()
     shared = {"p": prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
-    extra: list[str] = []
-    files["main.c"] = templates.get_template("main.c.j2").render(
-        shared | {"extra": extra, "tolerance": number(TOLERANCE)}
-    )
+    files["main.c"] = templates.get_template("main.c.j2").render(shared | {"tolerance": number(TOLERANCE)})
     files["recorded.h"] = recorded_header(recorded, code)
     files["CMakeLists.txt"] = templates.get_template("CMakeLists.txt.j2").render(shared)
     files["README.md"] = templates.get_template("README.md.j2").render(

@@ -77,7 +77,6 @@ class ModeCode:
     start: bool
     m_eq: int
     n_null: int
-    command_offset: bool
     h_size: int
     targets: tuple[str, ...]
     body: tuple[str, ...]
@@ -197,7 +196,6 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         start=bool(reduced.start.size1()),
         m_eq=reduced.m_eq,
         n_null=reduced.n - reduced.m_eq,
-        command_offset=not reduced.k.is_zero(),
         h_size=reduced.n if diagonal else reduced.n**2,
         targets=tuple(outputs),
         body=tuple(emit(function, sources, list(outputs), angles)),
