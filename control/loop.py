@@ -32,6 +32,10 @@ class Step(Protocol):
     def mode(self) -> Mode:
         """The motion mode."""
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what a call takes by keyword beyond the state and the twist."""
+
     def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
         """Give the command at a state."""
 
@@ -115,7 +119,8 @@ def simulate(
     Parameters
     ----------
     step : Step
-        The controller; `dt` is handed to it at every tick.
+        The controller; `dt` is handed to it at every tick, and the last command as `qd_prev` where it takes one (the
+        arm starts at rest).
     guide : Guide
         Gives the twist asked for.
     q0 : array_like, shape (nv,)
@@ -143,16 +148,19 @@ def simulate(
         raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
     free = list(step.mode.free_rows)
     q = np.array(q0, dtype=float)
+    remembers = "qd_prev" in step.inputs
+    qd = np.zeros(step.robot.nv)
     states, twists, positions, results = [], [], [], []
     for tick in range(ticks):
         pose = step.robot.pose(q)
         v = (step.mode.twist_map_at(pose) @ guide.twist(tick * dt, pose))[free]
-        result = step(q, v, dt=dt)
+        result = step(q, v, dt=dt, **({"qd_prev": qd} if remembers else {}))
         states.append(q)
         twists.append(v)
         positions.append(pose[:3, 3])
         results.append(result)
-        q = q + dt * result.qd
+        qd = result.qd
+        q = q + dt * qd
         if on_tick is not None:
             on_tick(tick + 1, ticks)
     columns: dict[str, object] = {

@@ -1,9 +1,13 @@
 """The closed loop and its paths."""
 
+from dataclasses import dataclass
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
 from kinqp.control import PathFollower, SemicirclePath, make_step, simulate
+from kinqp.formulations import Formulation, QuadraticProgram, Tick
 from kinqp.robots import load_robot
 from kinqp.solvers import Status
 from tests.finite_differences import difference_jacobian
@@ -91,3 +95,21 @@ def test_every_tick_is_reported() -> None:
     seen: list[tuple[int, int]] = []
     simulate(step, Still(), np.zeros(7) + 0.5, 0.005, on_tick=lambda done, total: seen.append((done, total)))
     assert seen == [(i, 5) for i in range(1, 6)]
+
+
+@dataclass(frozen=True)
+class Counting(Formulation):
+    """Every joint one millimetre or milliradian per second faster than in the tick before."""
+
+    name: ClassVar[str] = "counting"
+
+    def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
+        qd = qp.variable("qd", tick.nv)
+        qp.minimize(qd - (tick.qd_prev + 1e-3))
+        qp.command(qd)
+
+
+def test_a_step_that_remembers_gets_the_last_command() -> None:
+    step = make_step(load_robot("lbr_med14"), Counting(), "free")
+    run = simulate(step, Still(), np.zeros(7), 0.005)
+    np.testing.assert_allclose(run.qd, np.outer(1e-3 * np.arange(1, 6), np.ones(7)), atol=1e-15)
