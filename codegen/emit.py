@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import casadi as ca
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 
 class EmitError(ValueError):
@@ -56,7 +57,7 @@ _OPERATIONS: Final[dict[int, str]] = {
     ca.OP_SIGN: "{0} > 0.0 ? 1.0 : ({0} < 0.0 ? -1.0 : 0.0)",
     ca.OP_IF_ELSE_ZERO: "{0} != 0.0 ? {1} : 0.0",
 }
-_NAME: Final = re.compile(r"\b[ar]\d+\b")
+_NAME: Final = re.compile(r"\b[A-Za-z_]\w*")
 _COMPARISONS: Final[dict[int, str]] = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
 _TRIGONOMETRY: Final[dict[int, str]] = {ca.OP_SIN: "sine", ca.OP_COS: "cosine"}
 
@@ -69,8 +70,31 @@ def number(value: float) -> str:
     return text if any(mark in text for mark in ".en") else text + ".0"
 
 
+@dataclass(frozen=True)
+class Call:
+    """A statement among the others that reads and writes arrays, such as the call of a kernel.
+
+    Attributes
+    ----------
+    text : str
+        The C statement.
+    fills : tuple of int
+        Which of the function's inputs it writes: what depends on them comes behind it.
+    writes : tuple of str
+        Names of the arrays that it writes.
+    """
+
+    text: str
+    fills: tuple[int, ...]
+    writes: tuple[str, ...]
+
+
 def emit(
-    function: ca.Function, sources: Sequence[str], targets: Sequence[str], tabulated: Mapping[str, str] | None = None
+    function: ca.Function,
+    sources: Sequence[str | Sequence[str]],
+    targets: Sequence[str | Sequence[str]],
+    tabulated: Mapping[str, str] | None = None,
+    calls: Sequence[Call] = (),
 ) -> list[str]:
     """Write an SX function as C statements.
 
@@ -78,13 +102,14 @@ def emit(
     ----------
     function : ca.Function
         Made of SX; all inputs and outputs dense.
-    sources, targets : sequence of str
-        C expressions of the arrays that its inputs are read from and its outputs written to, in its order. Matrices are
-        column by column, as CasADi has them.
-
+    sources, targets : sequence of str or of sequences of str
+        C expressions of the arrays that its inputs are read from and its outputs written to, in its order, or of all
+        their entries. Matrices are column by column, as CasADi has them.
     tabulated : mapping of str to str, optional
         Arguments whose sine and cosine stand in the arrays `sine` and `cosine`: C expression of the argument to the
         subscript, brackets included.
+    calls : sequence of Call
+        Statements to be put in, in this order; each may read outputs that depend on what earlier ones fill in.
 
     Returns
     -------
@@ -100,11 +125,18 @@ def emit(
     lines: list[str] = []
     reciprocals: dict[str, str] = {}
     conditions: dict[str, str] = {}
-    shared = _shared_divisors(function, sources)
-    for operation, operands, result in _statements(function, sources):
+    statements = list(_statements(function, sources, calls))
+    shared = _shared_divisors(statements)
+    # What depends on no call comes first, then each call and what depends on it; otherwise the order is CasADi's.
+    statements.sort(key=lambda statement: statement.stage)
+    stage = 0
+    for operation, operands, result, needed in statements:
+        while stage < needed:
+            lines.append(calls[stage].text)
+            stage += 1
         if operation == ca.OP_OUTPUT:
             which, entry = map(int, result.split())
-            lines.append(f"{targets[which]}[{entry}] = {operands[0]};")
+            lines.append(f"{_entry(targets[which], entry)} = {operands[0]};")
             continue
         if operation in _TRIGONOMETRY and operands[0] in tabulated:
             # Sines and cosines of the inputs are all taken at once, before this.
@@ -130,45 +162,67 @@ def emit(
             if operation == ca.OP_DIV:
                 expression = f"{operands[0]} * {expression}"
         lines.append(f"const double {result} = {expression};")
-    return _without_unused(lines)
+    # Conditions by which only choices were made leave numbers behind that nobody reads.
+    arrays = [_NAME.findall(_entry(target, 0))[0] for target in targets if target]
+    return needed_for(lines, arrays, calls)[0]
 
 
-def _without_unused(lines: list[str]) -> list[str]:
-    """Drop numbers that nobody reads: conditions by which only choices were made leave them behind."""
-    used: set[str] = set()
-    kept: list[str] = []
+def needed_for(lines: Sequence[str], arrays: Iterable[str], calls: Sequence[Call] = ()) -> tuple[list[str], list[str]]:
+    """Split statements into those that some arrays need, and the others, both in their order."""
+    writes = {call.text: call.writes for call in calls}
+    wanted = set(arrays)
+    needed: list[str] = []
+    others: list[str] = []
     for line in reversed(lines):
         target, _, expression = line.partition(" = ")
-        if not line.startswith("const double ") or target.split()[2] in used:
-            used.update(_NAME.findall(expression))
-            kept.append(line)
-    return kept[::-1]
+        written = writes.get(line) or (target.removeprefix("const double ").partition("[")[0],)
+        if wanted.isdisjoint(written):
+            others.append(line)
+        else:
+            needed.append(line)
+            wanted.update(_NAME.findall(line if line in writes else expression))
+    return needed[::-1], others[::-1]
 
 
-def _statements(function: ca.Function, sources: Sequence[str]) -> Iterator[tuple[int, list[str], str]]:
-    """Instructions as (operation, operands, result), every result under a name of its own."""
-    values: dict[int, str] = {}
+class _Statement(NamedTuple):
+    operation: int
+    operands: list[str]
+    result: str
+    stage: int  # calls that have to come before
+
+
+def _entry(array: str | Sequence[str], entry: int) -> str:
+    return f"{array}[{entry}]" if isinstance(array, str) else array[entry]
+
+
+def _statements(
+    function: ca.Function, sources: Sequence[str | Sequence[str]], calls: Sequence[Call]
+) -> Iterator[_Statement]:
+    """Instructions, every result under a name of its own."""
+    filled = {which: stage for stage, call in enumerate(calls, start=1) for which in call.fills}
+    values: dict[int, tuple[str, int]] = {}
     for index in range(function.n_instructions()):
         operation = function.instruction_id(index)
         places = function.instruction_output(index)
         if operation == ca.OP_CONST:
             constant = number(function.instruction_constant(index))
-            values[places[0]] = f"({constant})" if constant.startswith("-") else constant
+            values[places[0]] = f"({constant})" if constant.startswith("-") else constant, 0
         elif operation == ca.OP_INPUT:
             which, entry = function.instruction_input(index)
-            values[places[0]] = f"{sources[which]}[{entry}]"
+            values[places[0]] = _entry(sources[which], entry), filled.get(which, 0)
         else:
-            operands = [values[place] for place in function.instruction_input(index)]
+            given = [values[place] for place in function.instruction_input(index)]
+            operands, stage = [name for name, _ in given], max((stage for _, stage in given), default=0)
             if operation == ca.OP_OUTPUT:
-                yield operation, operands, f"{places[0]} {places[1]}"
+                yield _Statement(operation, operands, f"{places[0]} {places[1]}", stage)
             else:
-                values[places[0]] = f"a{index}"
-                yield operation, operands, f"a{index}"
+                values[places[0]] = f"a{index}", stage
+                yield _Statement(operation, operands, f"a{index}", stage)
 
 
-def _shared_divisors(function: ca.Function, sources: Sequence[str]) -> set[str]:
+def _shared_divisors(statements: Sequence[_Statement]) -> set[str]:
     """Values that more than one division divides by: one division and two multiplications are cheaper than two."""
     counts = Counter(
-        operands[-1] for operation, operands, _ in _statements(function, sources) if operation in (ca.OP_DIV, ca.OP_INV)
+        statement.operands[-1] for statement in statements if statement.operation in (ca.OP_DIV, ca.OP_INV)
     )
     return {divisor for divisor, count in counts.items() if count > 1}

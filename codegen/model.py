@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from ..formulations import lower
-from .emit import emit, number
+from .emit import emit, needed_for, number
+from .kernels import agree, pack, padded, padded_rows, stage, used
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
 
 # New at every tick; all other run-time inputs are parameters.
 _SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
+# Rows of these are padded, for loops over four columns at a time.
+_PADDED: Final = ("A",)
+# These are needed only where a row is active.
+_LATE: Final = ("C", "K", "start")
 _COMMENTS: Final = {
     "q": "joint positions",
     "v": "velocity that the hand asks for, along the mode's axes",
@@ -62,8 +67,54 @@ class Field:
 
 
 @dataclass(frozen=True)
+class Shape:
+    """What is known of a mode's QP whatever the numbers, and saves work in its code.
+
+    Attributes
+    ----------
+    diagonal : bool
+        H is diagonal and there is neither gradient nor equality: without rows the answer is zero.
+    gradient : bool
+        There is a gradient.
+    start : bool
+        A feasible point was declared.
+    direct_rows : bool
+        Row i bounds variable i and nothing else.
+    direct_command : bool
+        The command is x itself.
+    same : bool
+        The command moves with x as the rows do: K = C.
+    """
+
+    diagonal: bool
+    gradient: bool
+    start: bool
+    direct_rows: bool
+    direct_command: bool
+    same: bool
+
+    @classmethod
+    def of(cls, reduced: Reduced) -> Shape:
+        """Look at a QP."""
+        gradient = not reduced.g.is_zero()
+        one = ca.SX.eye(reduced.n)
+        return cls(
+            diagonal=reduced.diagonal and not gradient and not reduced.m_eq,
+            gradient=gradient,
+            start=bool(reduced.start.size1()),
+            direct_rows=_identical(reduced.C, one),
+            direct_command=_identical(reduced.K, one) and reduced.k.is_zero(),
+            same=_identical(reduced.K, reduced.C),
+        )
+
+
+@dataclass(frozen=True)
 class ModeCode:
-    """One motion mode of a generated library; see ``templates/step.c.j2`` for the meaning of the flags."""
+    """One motion mode of a generated library.
+
+    `body` is what every tick computes, `late_body` what is needed only where the minimiser without rows is outside of
+    some, `start_body` what is needed of that only to keep to admissible points.
+    """
 
     text: str
     symbol: str
@@ -72,18 +123,38 @@ class ModeCode:
     m: int
     m_free: int
     m_fixed: int
-    diagonal: bool
-    gradient: bool
-    start: bool
     m_eq: int
-    n_null: int
-    h_size: int
-    targets: tuple[str, ...]
+    shape: Shape
+    arrays: tuple[str, ...]
+    declarations: tuple[str, ...]
     body: tuple[str, ...]
+    late_body: tuple[str, ...]
+    start_body: tuple[str, ...]
     row_body: tuple[str, ...]
+    kernels: tuple[str, ...]
     finite: tuple[Field, ...]
     rows: tuple[str, ...]
     inputs: tuple[Input, ...]
+
+    @property
+    def n_null(self) -> int:
+        """Variables left where the equalities have full rank."""
+        return self.n - self.m_eq
+
+    @property
+    def stride(self) -> int:
+        """Entries from one equality to the next."""
+        return padded(self.n)
+
+    @property
+    def width(self) -> int:
+        """Entries from one row to the next: of the null space's basis, or of the Hessian if there are no equalities."""
+        return padded(self.n_null) if self.m_eq else self.n
+
+    @property
+    def full_width(self) -> int:
+        """The same where dependent equalities leave more columns."""
+        return padded(self.n)
 
 
 @dataclass(frozen=True)
@@ -128,7 +199,7 @@ class StepCode:
 
 def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], prefix: str) -> StepCode:
     """Work out the code of a formulation on a robot in one or more modes."""
-    codes = tuple(_mode_code(lower(formulation, robot, mode)) for mode in modes)
+    codes = tuple(_mode_code(formulation, robot, mode) for mode in modes)
     largest: dict[str, Input] = {}
     for code in codes:
         # A mode without locked rows has nothing to say of their velocity, and C99 has no arrays of size zero.
@@ -162,26 +233,35 @@ def _field(given: Input) -> Field:
     return Field(given.name, comment, given.size, array, tuple(number(float(x)) for x in default))
 
 
-def _mode_code(lowered: Lowered) -> ModeCode:
-    reduced = reduce(lowered)
-    gradient = not reduced.g.is_zero()
-    diagonal = reduced.diagonal and not gradient and not reduced.m_eq
-    outputs = _outputs(lowered, reduced, gradient=gradient, diagonal=diagonal)
-    inputs = lowered.inputs
-    function = ca.Function(
-        "data",
-        [given.symbol for given in inputs],
-        [ca.densify(value) for value in ca.cse([ca.SX(value) for value in outputs.values()])],
-    )
+def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
+    lowered, reduced = _lower_for_c(formulation, robot, mode)
+    inputs, tick = lowered.inputs, lowered.tick
     fields = {given.name: _field(given) for given in inputs}
     # A parameter that is a plain number is read through its address, as an array of one.
-    sources = [
-        f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
+    sources = {
+        name: f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
         for name, field in fields.items()
-    ]
-    mode = lowered.mode
-    tick = lowered.tick
+    }
+    shape = Shape.of(reduced)
+    outputs = _outputs(lowered, reduced, shape)
+    cuts = used(tick.cuts, list(outputs.values()))
+    staged = stage(cuts, {given.name: (given.symbol, sources[given.name]) for given in inputs}, len(inputs))
+    function = ca.Function(
+        "data",
+        [*(given.symbol for given in inputs), *(symbol for cut in cuts for symbol in cut.symbols)],
+        [ca.densify(value) for value in ca.cse([ca.SX(value) for value in (*outputs.values(), *staged.outputs)])],
+    )
+    targets = [padded_rows(value.shape, name) if name in _PADDED else name for name, value in outputs.items()]
     angles = {f"in->q[{i}]": f"[{i}]" for i in range(tick.nv)}
+    lines = emit(function, [*sources.values(), *staged.sources], [*targets, *staged.targets], angles, staged.calls)
+    calls = (*staged.first, *staged.calls)
+    late = [name for name in outputs if name in _LATE and (name != "start" or shape.diagonal)]
+    if not shape.diagonal:
+        late += [name for name in ("K", "C") if name not in late]
+    early = [name for name in outputs if name not in _LATE]
+    first, rest = needed_for([*(call.text for call in staged.first), *lines], early, calls)
+    second, third = needed_for(rest, late, calls)
+    first = pack(first, [*staged.padded, *(name for name in outputs if name in _PADDED)])
     rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
     return ModeCode(
         text=str(mode),
@@ -191,30 +271,51 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         m=reduced.m,
         m_free=mode.m_free,
         m_fixed=mode.m_fixed,
-        diagonal=diagonal,
-        gradient=gradient,
-        start=bool(reduced.start.size1()),
         m_eq=reduced.m_eq,
-        n_null=reduced.n - reduced.m_eq,
-        h_size=reduced.n if diagonal else reduced.n**2,
-        targets=tuple(outputs),
-        body=tuple(emit(function, sources, list(outputs), angles)),
+        shape=shape,
+        arrays=tuple(f"{name}[{max(1, _size(name, value))}]" for name, value in outputs.items()),
+        declarations=staged.declarations,
+        body=tuple(first),
+        late_body=tuple(second),
+        start_body=tuple(third),
         row_body=tuple(emit(rows, ["q"], ["rows"], {f"q[{i}]": f"[{i}]" for i in range(tick.nv)})),
+        kernels=tuple(dict.fromkeys(cut.kernel for cut in cuts)),
         finite=tuple(field for name, field in fields.items() if name in _SIGNALS and field.size),
         rows=reduced.rows,
         inputs=inputs,
     )
 
 
-def _outputs(lowered: Lowered, reduced: Reduced, *, gradient: bool, diagonal: bool) -> dict[str, ca.SX]:
-    # CasADi writes column by column, the C code reads row by row: hence the transposes.
-    outputs = {"H": ca.diag(reduced.H) if diagonal else reduced.H}
-    if gradient:
+def _identical(a: ca.SX, b: ca.SX) -> bool:
+    # Of two expressions that are one, CasADi knows the difference.
+    return a.shape == b.shape and bool((a - b).is_zero())
+
+
+def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lowered, Reduced]:
+    """Lower with cuts, unless the declaration looks through one: a derivative doesn't see what lies behind a symbol."""
+    plain, cut = lower(formulation, robot, mode), lower(formulation, robot, mode, cut=True)
+    return (cut, reduce(cut)) if agree(plain, cut) else (plain, reduce(plain))
+
+
+def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.SX]:
+    """Arrays of the generated step that formulas fill in, each as C reads it: row by row."""
+    # CasADi writes column by column: hence the transposes.
+    outputs = {"H": ca.diag(reduced.H) if shape.diagonal else reduced.H}
+    if shape.gradient:
         outputs["g"] = reduced.g
     if reduced.m_eq:
-        outputs |= {"A": reduced.A.T, "b": reduced.b}
-    outputs |= {"C": reduced.C.T, "lower": reduced.lower, "upper": reduced.upper, "K": reduced.K.T, "k": reduced.k}
-    outputs["J"] = lowered.tick.J_free.T
-    if reduced.start.size1():
+        outputs |= {"A": reduced.A, "b": reduced.b}
+    outputs |= {"lower": reduced.lower, "upper": reduced.upper, "J": lowered.tick.J_free.T}
+    if not shape.direct_rows:
+        outputs["C"] = reduced.C.T
+    if not shape.direct_command:
+        outputs["k"] = reduced.k
+        if not shape.same:
+            outputs["K"] = reduced.K.T
+    if shape.start:
         outputs["start"] = reduced.start
     return outputs
+
+
+def _size(name: str, value: ca.SX) -> int:
+    return value.size1() * padded(value.size2()) if name in _PADDED else value.numel()

@@ -80,7 +80,7 @@ def reduce(lowered: Lowered) -> Reduced:
     lowered : Lowered
         What to reduce.
     """
-    data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
+    data = dict(zip(DATA, lowered.function(*lowered.symbols), strict=True))
     data = {name: ca.sparsify(ca.SX(value)) for name, value in data.items()}
     kept, T, t, A, b = _substitute(data)
     HT = data["H"] @ T

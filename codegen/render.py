@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import jinja2
 
 from ..solvers.active_set import fixed_size_sources
+from .kernels import padded
 
 if TYPE_CHECKING:
     from .model import StepCode
@@ -57,15 +58,14 @@ def render_step(code: StepCode) -> dict[str, str]:
         "summary": "One control cycle of a hand-guided arm: joint positions and hand velocity in, joint rates out.",
         "version": library_version(),
         "status_header": header,
-        "math_header": _template_text("kinqp_math.h"),
+        "math_header": math_header(),
         "solver_header": solver_header,
         "solver_source": solver_source,
         "sizes": [{"n": n, "m": m} for n, m in code.sizes],
         "largest": max(n for n, _ in code.sizes),
         "modes": code.modes,
-        "dense": any(not mode.diagonal for mode in code.modes),
-        "equalities": any(mode.m_eq for mode in code.modes),
-        "most_equalities": max(mode.m_eq for mode in code.modes),
+        "kernels": _kernels(code),
+        "most_joints": padded(code.nv),
         "parameters": code.parameters,
         "inputs": code.inputs,
         "nv": code.nv,
@@ -86,6 +86,21 @@ def render_batch(code: StepCode) -> str:
     """Fill in the function that Python calls for many ticks at once."""
     values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
     return environment().get_template("batch.c.j2").render(values)
+
+
+def math_header() -> str:
+    """Vectors of four numbers, and elementary functions on them."""
+    return _template_text("kinqp_lanes.h") + _template_text("kinqp_math.h")
+
+
+def _kernels(code: StepCode) -> str:
+    """Source of the kernels that any mode calls."""
+    names = [kernel for mode in code.modes for kernel in mode.kernels]
+    if any(not mode.shape.diagonal for mode in code.modes):
+        names.append("cholesky")
+    if any(mode.m_eq for mode in code.modes):
+        names.append("null_space")
+    return "\n".join(_template_text(f"kernels/{name}.h") for name in ("common", *dict.fromkeys(names))) if names else ""
 
 
 def _template_text(name: str) -> str:

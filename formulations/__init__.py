@@ -3,6 +3,7 @@
 from .base import Formulation
 from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
+from .cuts import Cut
 from .evaluator import Evaluator, Instance
 from .inputs import InputError, check_input
 from .inverse import factor_fixed_rows, robust_inverse
@@ -21,6 +22,7 @@ __all__ = [
     "DEFAULT_JOINT_WEIGHT",
     "MODE_NAMES",
     "CartesianError",
+    "Cut",
     "DeclarationError",
     "Evaluator",
     "Formulation",

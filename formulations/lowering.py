@@ -59,8 +59,8 @@ class Lowered:
     inputs : tuple of Input
         Run-time inputs of `function`, in its order.
     function : ca.Function
-        Inputs by name to `DATA`: the canonical QP; `K`, `k` with command = K x + k; `x_feasible` (empty if none was
-        declared). Matrices come out as declared, not transposed.
+        Inputs by name, and the symbols of cuts, to `DATA`: the canonical QP; `K`, `k` with command = K x + k;
+        `x_feasible` (empty if none was declared). Matrices come out as declared, not transposed.
     variables : dict of str to slice
         Where each declared variable stands in x.
     rows : RowNames
@@ -79,12 +79,18 @@ class Lowered:
     constant: dict[str, NDArray[np.bool_]]
 
     @property
+    def symbols(self) -> tuple[ca.SX, ...]:
+        """Arguments of `function`: the inputs' symbols, then those of the tick's cuts."""
+        cut = (symbol for made in self.tick.cuts for symbol in made.symbols)
+        return (*(given.symbol for given in self.inputs), *cut)
+
+    @property
     def n(self) -> int:
         """Number of variables."""
         return int(self.function.size1_out("g"))
 
 
-def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
+def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = False) -> Lowered:
     """Find the canonical QP of a formulation on a robot in a mode.
 
     Parameters
@@ -95,6 +101,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
         The arm.
     mode : Mode
         Its motion mode.
+    cut : bool
+        For generated C: leave to kernels what they compute better; see `Tick`.
 
     Raises
     ------
@@ -102,7 +110,7 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
         Naming the term or rows that are not affine in the variables, a side that depends on them, or a missing
         command.
     """
-    tick = Tick(robot, mode, formulation.bounds)
+    tick = Tick(robot, mode, formulation.bounds, cut=cut)
     # The state and the hand's velocity are inputs of every step, also of one that does not use them.
     _ = tick.q, tick.v
     qp = QuadraticProgram()
@@ -131,9 +139,13 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
     data["x_feasible"] = _feasible_point(qp, formulation.name)
 
     dense = {name: ca.densify(ca.simplify(data[name])) for name in DATA}
-    symbols = [given.symbol for given in tick.inputs]
+    cuts = [symbol for made in tick.cuts for symbol in made.symbols]
     function = ca.Function(
-        "lowered", symbols, [dense[name] for name in DATA], [given.name for given in tick.inputs], list(DATA)
+        "lowered",
+        [*(given.symbol for given in tick.inputs), *cuts],
+        [dense[name] for name in DATA],
+        [*(given.name for given in tick.inputs), *(f"cut{k}" for k in range(len(cuts)))],
+        list(DATA),
     )
     ends = np.cumsum([variable.size1() for variable in qp.variables.values()])
     variables = {

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 import numpy as np
 
+from .algebra import matmul
 from .bounds import BOUNDS, velocity_bounds
+from .cuts import Cut, make_cut
 from .inverse import FixedRows, factor_fixed_rows, robust_inverse
 
 if TYPE_CHECKING:
@@ -72,18 +74,22 @@ class Tick:
         Which rows of the twist are guided and which are locked.
     bounds : {"viable", "thesis"}
         How `qd_lo` and `qd_hi` follow from the limits.
+    cut : bool
+        Give null space, inverse and bounds as symbols, and say in `cuts` how to compute them: for generated C.
 
     Notes
     -----
     Every quantity is a ``ca.SX`` column or matrix in SI units. `v` and `v_fixed` are counted along the mode's axes.
     """
 
-    def __init__(self, robot: Robot, mode: Mode, bounds: str = "viable") -> None:
+    def __init__(self, robot: Robot, mode: Mode, bounds: str = "viable", *, cut: bool = False) -> None:
         if bounds not in BOUNDS:
             raise ValueError(f"bounds: expected one of {', '.join(BOUNDS)}, got {bounds!r}")
         self.robot: Final = robot
         self.mode: Final = mode
         self.bounds: Final = bounds
+        self.cuts: Final[list[Cut]] = []
+        self._cut: Final = cut
         self._inputs: dict[str, Input] = {}
 
     @property
@@ -215,6 +221,15 @@ class Tick:
             name, default, size=self.nv, lowest=0.0, positive=True, may_be_infinite=may_be_infinite, unit=unit
         )
 
+    def _computed(
+        self, kernel: str, sizes: tuple[int, ...], inputs: tuple[ca.SX, ...], formulas: tuple[ca.SX, ...]
+    ) -> tuple[ca.SX, ...]:
+        """Results by their formulas or, in a tick that is cut, as symbols."""
+        if not self._cut:
+            return formulas
+        self.cuts.append(make_cut(kernel, sizes, inputs, formulas))
+        return self.cuts[-1].symbols
+
     @cached_property
     def _kinematics(self) -> SymbolicKinematics:
         return self.robot.symbolic(self.q)
@@ -255,25 +270,46 @@ class Tick:
         return factor_fixed_rows(self.J_fixed)
 
     @cached_property
+    def _locked(self) -> tuple[ca.SX, ...]:
+        """`J_bar`, `qd_fixed` and `v_left`, which share the factors of the locked rows."""
+        if not self.m_fixed:
+            return self.J_free, ca.SX(self.nv, 1), self.v
+        qd_fixed = self._fixed.solve(self.v_fixed)
+        formulas = (self._fixed.project(self.J_free), qd_fixed, self.v - matmul(self.J_free, qd_fixed))
+        inputs = (self.J_free, self.J_fixed, self.v_fixed, self.v)
+        return self._computed("locked_rows", (self.m_free, self.m_fixed, self.nv), inputs, formulas)
+
+    @cached_property
     def J_bar(self) -> ca.SX:
         """Guided rows within the null space of the locked ones, J_free N_c, shape (m_free, nv)."""
-        return self._fixed.project(self.J_free) if self.m_fixed else self.J_free
+        return self._locked[0]
 
     @cached_property
     def inverse(self) -> ca.SX:
         """Singularity-robust inverse of `J_bar`, shape (nv, m_free); its columns never move the locked rows."""
         threshold = self.parameter("damping_threshold", 0.08, lowest=0.0, positive=True, unit="m or rad")
         damping_max = self.parameter("damping_max", 0.05, lowest=0.0, positive=True, unit="m or rad")
-        return robust_inverse(self.J_bar, threshold, damping_max)
+        formulas = (robust_inverse(self.J_bar, threshold, damping_max),)
+        inputs = (self.J_bar, threshold, damping_max)
+        return self._computed("robust_inverse", (self.m_free, self.nv), inputs, formulas)[0]
 
     @cached_property
     def qd_fixed(self) -> ca.SX:
         """Smallest joint velocity that gives the locked rows `v_fixed`, shape (nv, 1) [rad/s or m/s]."""
-        return self._fixed.solve(self.v_fixed) if self.m_fixed else ca.SX(self.nv, 1)
+        return self._locked[1]
+
+    @property
+    def v_left(self) -> ca.SX:
+        """What `qd_fixed` leaves of `v` to do, shape (m_free, 1) [m/s, rad/s]: all, unless drift is corrected."""
+        return self._locked[2]
 
     @cached_property
     def _bounds(self) -> tuple[ca.SX, ca.SX]:
-        return velocity_bounds(self.bounds, self.q, self.q_min, self.q_max, self.qd_max, self.qdd_max, self.dt)
+        inputs = (self.q, self.q_min, self.q_max, self.qd_max, self.qdd_max, self.dt)
+        lower, upper = self._computed(
+            f"{self.bounds}_bounds", (self.nv,), inputs, velocity_bounds(self.bounds, *inputs)
+        )
+        return lower, upper
 
     @property
     def qd_lo(self) -> ca.SX:

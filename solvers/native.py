@@ -35,6 +35,9 @@ DEFAULT_FLAGS: tuple[str, ...] = (
     "-lm",
 )
 
+#: Among flags: use all that this machine's processor has. The library then belongs to processors like it.
+NATIVE = "-march=native"
+
 _COMPILERS = ("cc", "gcc", "clang")
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 #: Lines of the compiler's own words in an error message.
@@ -55,7 +58,8 @@ def build_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str]
     sources
         Text by file name; every ``.c`` among them is compiled, the others are there to be included.
     flags
-        Passed to the compiler in this order, libraries (``-l...``) behind the sources.
+        Passed to the compiler in this order, libraries (``-l...``) behind the sources. `NATIVE` is left out where the
+        compiler does not know it.
 
     Returns
     -------
@@ -78,7 +82,10 @@ def build_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str]
             f"build_library: expected at least one .c among the sources, got {', '.join(sources) or 'none'}"
         )
     command = compiler()
-    library = cache_directory() / f"{name}-{_key(sources, flags, command)}.so"
+    machine = _processor(command) if NATIVE in flags else ""
+    if not machine:
+        flags = [flag for flag in flags if flag != NATIVE]
+    library = cache_directory() / f"{name}-{_key(sources, flags, command, machine)}.so"
     if _intact(library):
         return library
     try:
@@ -131,8 +138,8 @@ def declarations(header: str) -> str:
     return "\n".join(line for line in text.splitlines() if line.strip() and not line.startswith("#"))
 
 
-def _key(sources: Mapping[str, str], flags: Sequence[str], command: tuple[str, ...]) -> str:
-    parts = [*command, _version(command), platform.machine(), sys.platform, *flags]
+def _key(sources: Mapping[str, str], flags: Sequence[str], command: tuple[str, ...], machine: str) -> str:
+    parts = [*command, _version(command), platform.machine(), machine, sys.platform, *flags]
     for file in sorted(sources):
         parts += [file, sources[file]]
     digest = hashlib.sha256()
@@ -150,6 +157,16 @@ def _version(command: tuple[str, ...]) -> str:
     except OSError as error:
         raise CompilerError(f"the C compiler {shlex.join(command)} cannot be run: {error}; set KINQP_CC") from error
     return answer.stdout
+
+
+@cache
+def _processor(command: tuple[str, ...]) -> str:
+    """What the compiler can use of this machine's processor, as its own macros; empty: it can't tell.
+
+    A cache may be shared by machines that differ, and what was built for one may be an illegal instruction on another.
+    """
+    answer = _run([*command, NATIVE, "-dM", "-E", "-x", "c", os.devnull])
+    return answer.stdout if answer.returncode == 0 else ""
 
 
 def _compile(

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import kinqp.codegen.emit as emit_module
 from kinqp.codegen.emit import EmitError, emit, number
-from kinqp.codegen.render import environment
+from kinqp.codegen.render import math_header
 from kinqp.solvers.native import build_library
 from tests.codegen.compiled import QUICK_FLAGS
 
@@ -119,12 +119,6 @@ def load(name: str, text: str, declarations: str) -> tuple[Any, Any]:
     ffi.cdef(declarations)
     flags = (*QUICK_FLAGS, "-Wall", "-Wextra", "-Wno-unused-function", "-Werror")
     return ffi.dlopen(str(build_library(f"kinqp_test_{name}", {f"{name}.c": text}, flags=flags))), ffi
-
-
-def math_header() -> str:
-    loader = environment().loader
-    assert loader is not None
-    return loader.get_source(environment(), "kinqp_math.h")[0]
 
 
 @pytest.mark.parametrize("name", EXACT)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.codegen.test_emit import load, math_header
+from kinqp.codegen.render import math_header
+from tests.codegen.test_emit import load
 
 Array = NDArray[np.float64]
 NEEDS_EXTENDED = pytest.mark.skipif(

@@ -34,8 +34,8 @@ STAGES: Final = (
     "sines and cosines",
     "kinematics, inverse, bounds",
     "reduction",
-    "solve",
-    "recover",
+    "without rows",
+    "with rows",
     "command",
 )
 WHOLE, QP, PROFILE = 0, 1, 2
@@ -70,7 +70,7 @@ class TimedTick:
         code = step_code(robot, get_formulation(formulation), [Mode.parse(mode)], prefix)
         sources = render_step(code)
         source = sources.pop(f"{prefix}.c")
-        sources["step.inc"] = instrumented(source, code.modes[0].targets)
+        sources["step.inc"] = instrumented(source, [array.partition("[")[0] for array in code.modes[0].arrays])
         sources["batch.inc"] = render_batch(code)
         sources["timing.c"] = (files(__package__) / "timing.c").read_text(encoding="utf-8")
         library = build_library(
@@ -129,7 +129,7 @@ class TimedTick:
 
     def qp(self) -> Array:
         """Smallest time of the QP of each state [ns], shape (N,); with `level` QP."""
-        return self.stages()[:, STAGES.index("recover")]
+        return self.stages()[:, STAGES.index("with rows")]
 
     def loop(self, q: Array, v: Array) -> float:
         """Run ticks in a C loop without clocks; nanoseconds in all."""
@@ -158,9 +158,10 @@ def instrumented(source: str, targets: Sequence[str]) -> str:
     # what brings its answer back to x.
     sines = r"    KINQP_MARK(2, 1);\n\g<0>    KINQP_HOLD(sine); KINQP_HOLD(cosine); KINQP_MARK(2, 2);\n"
     places = (
-        (r"^    kinqp_sincos\(.*\n", sines),
-        (r"^    \w+_data\(parameters, input,.*\n", rf"\g<0>   {hold} KINQP_MARK(1, 3);\n"),
-        (r"^    const kinqp_status status = (?:[^;]|\n)*;\n", r"    KINQP_MARK(2, 4);\n\g<0>    KINQP_MARK(2, 5);\n"),
+        (r"^    kinqp_sincos\(\d.*\n", sines),
+        (r"^    kinqp_status status = KINQP_SOLVED;\n", rf"   {hold} KINQP_MARK(1, 3);\n\g<0>"),
+        (r"^    /\* (?:Without rows the answer|The minimiser without rows).*\n", r"    KINQP_MARK(2, 4);\n\g<0>"),
+        (r"^    if \(outside\) \{\n", r"    KINQP_MARK(2, 5);\n\g<0>"),
         (r"^    double qd\[NV\];\n", r"    KINQP_HOLD(x); KINQP_MARK(1, 6);\n\g<0>"),
     )  # fmt: skip
     text = source

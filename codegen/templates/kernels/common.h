@@ -1,0 +1,59 @@
+/* Arrays that run over joints are padded with zeros to a multiple of four, so that loops over them have no remainder. */
+KINQP_INLINE int kinqp_padded(int n) { return (n + 3) / 4 * 4; }
+
+/* out := a + share * b, over a multiple of four entries. */
+KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const double *b, double *out) {
+    for (int i = 0; i < n; i += 4) {
+        kinqp_lanes x;
+        kinqp_load(a + i, &x);
+        kinqp_add_scaled(share, b + i, &x);
+        kinqp_store(out + i, &x);
+    }
+}
+
+/* inverse (m, m) := the inverse of a symmetric positive definite matrix, m <= 6, by L D L' without pivoting. Returns the
+ * smallest share of any diagonal entry that is left as its pivot. */
+KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double *inverse) {
+    double L[36], scaled[36], reciprocal[6], least = 1.0;
+    for (int j = 0; j < m; ++j) {
+        for (int i = j; i < m; ++i) {
+            double value = matrix[i * m + j];
+            for (int k = 0; k < j; ++k) value -= L[i * m + k] * scaled[j * m + k];
+            scaled[i * m + j] = value;
+        }
+        const double pivot = scaled[j * m + j], share = pivot / matrix[j * m + j];
+        least = share >= least ? least : share; /* also if it isn't a number */
+        reciprocal[j] = 1.0 / pivot;
+        for (int i = j + 1; i < m; ++i) L[i * m + j] = scaled[i * m + j] * reciprocal[j];
+    }
+    for (int c = 0; c < m; ++c) {
+        double x[6];
+        for (int i = c; i < m; ++i) {
+            x[i] = i == c ? 1.0 : 0.0;
+            for (int k = c; k < i; ++k) x[i] -= L[i * m + k] * x[k];
+        }
+        for (int i = m - 1; i >= c; --i) {
+            x[i] *= reciprocal[i];
+            for (int k = i + 1; k < m; ++k) x[i] -= L[k * m + i] * x[k];
+        }
+        for (int i = c; i < m; ++i) inverse[i * m + c] = inverse[c * m + i] = x[i];
+    }
+    return least;
+}
+
+/* The same, and whether the matrix is far from singular: every row keeps at least 1e-4 of its squared length outside the
+ * span of those before. Three rows by cofactors, whose chains are short; they are exact enough while this holds. */
+KINQP_INLINE int kinqp_inverse_of_positive(int m, const double *matrix, double *inverse) {
+    if (m != 3) return kinqp_inverse_by_factors(m, matrix, inverse) > 1e-4;
+    const double a = matrix[0], b = matrix[1], c = matrix[2], d = matrix[4], e = matrix[5], f = matrix[8];
+    const double aa = d * f - e * e, ab = c * e - b * f, ac = b * e - c * d;
+    const double bb = a * f - c * c, bc = b * c - a * e, cc = a * d - b * b;
+    const double determinant = a * aa + (b * ab + c * ac), scale = 1.0 / determinant;
+    inverse[0] = aa * scale;
+    inverse[1] = inverse[3] = ab * scale;
+    inverse[2] = inverse[6] = ac * scale;
+    inverse[4] = bb * scale;
+    inverse[5] = inverse[7] = bc * scale;
+    inverse[8] = cc * scale;
+    return determinant > 1e-4 * (a * (d * f));
+}
