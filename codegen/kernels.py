@@ -230,9 +230,14 @@ def padded(size: int) -> int:
     return -(-size // LANES) * LANES
 
 
-def padded_rows(shape: tuple[int, int], name: str) -> tuple[str, ...]:
-    """C expressions of a matrix's entries, column by column, where its rows are padded."""
-    return _layout(shape, "rows", name)[1]
+def places(shape: tuple[int, int], layout: Layout, name: str) -> tuple[str, ...]:
+    """C expressions of a matrix's entries, column by column, in an array of this layout."""
+    return _layout(shape, layout, name)[1]
+
+
+def room(shape: tuple[int, int], layout: Layout) -> int:
+    """Entries of that array, padding included."""
+    return _layout(shape, layout, "")[0]
 
 
 def _label(value: ca.SX) -> str:

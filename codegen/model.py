@@ -10,19 +10,21 @@ import casadi as ca
 
 from ..formulations import lower
 from .emit import emit, needed_for, number
-from .kernels import agree, pack, padded, padded_rows, stage, used
+from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..formulations import Formulation, Input, Lowered, Mode
+    from ..formulations import Cut, Formulation, Input, Lowered, Mode
     from ..robots import Robot
+    from .kernels import Layout
 
 # New at every tick; all other run-time inputs are parameters.
 _SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 # Rows of these are padded, for loops over four columns at a time.
-_PADDED: Final = ("A",)
+_PADDED: Final = ("A", "J")
+_PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
 _LATE: Final = ("C", "K", "start")
 _COMMENTS: Final = {
@@ -126,6 +128,7 @@ class ModeCode:
     m_eq: int
     shape: Shape
     arrays: tuple[str, ...]
+    aliases: dict[str, str]
     declarations: tuple[str, ...]
     body: tuple[str, ...]
     late_body: tuple[str, ...]
@@ -142,9 +145,9 @@ class ModeCode:
         return self.n - self.m_eq
 
     @property
-    def stride(self) -> int:
-        """Entries from one equality to the next."""
-        return padded(self.n)
+    def row_stride(self) -> int:
+        """Number of rows, padded."""
+        return padded(self.m)
 
     @property
     def width(self) -> int:
@@ -251,17 +254,19 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
         [*(given.symbol for given in inputs), *(symbol for cut in cuts for symbol in cut.symbols)],
         [ca.densify(value) for value in ca.cse([ca.SX(value) for value in (*outputs.values(), *staged.outputs)])],
     )
-    targets = [padded_rows(value.shape, name) if name in _PADDED else name for name, value in outputs.items()]
+    layouts = {name: _layout_of(name, shape) for name in outputs}
+    aliases = _aliases(outputs, layouts, cuts)
+    targets = [places(value.shape, layouts[name], name) for name, value in outputs.items()]
     angles = {f"in->q[{i}]": f"[{i}]" for i in range(tick.nv)}
     lines = emit(function, [*sources.values(), *staged.sources], [*targets, *staged.targets], angles, staged.calls)
     calls = (*staged.first, *staged.calls)
     late = [name for name in outputs if name in _LATE and (name != "start" or shape.diagonal)]
-    if not shape.diagonal:
-        late += [name for name in ("K", "C") if name not in late]
-    early = [name for name in outputs if name not in _LATE]
+    early = [aliases.get(name, name) for name in outputs if name not in _LATE]
+    lines = [line for line in lines if line.partition("[")[0] not in aliases]
     first, rest = needed_for([*(call.text for call in staged.first), *lines], early, calls)
-    second, third = needed_for(rest, late, calls)
-    first = pack(first, [*staged.padded, *(name for name in outputs if name in _PADDED)])
+    second, third = needed_for(rest, [aliases.get(name, name) for name in late], calls)
+    padded_arrays = [*staged.padded, *(name for name, layout in layouts.items() if layout != "plain")]
+    first, second = pack(first, padded_arrays), pack(second, padded_arrays)
     rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
     return ModeCode(
         text=str(mode),
@@ -273,7 +278,12 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
         m_fixed=mode.m_fixed,
         m_eq=reduced.m_eq,
         shape=shape,
-        arrays=tuple(f"{name}[{max(1, _size(name, value))}]" for name, value in outputs.items()),
+        arrays=tuple(
+            f"{name}[{max(1, room(value.shape, layouts[name]))}]"
+            for name, value in outputs.items()
+            if name not in aliases
+        ),
+        aliases=aliases,
         declarations=staged.declarations,
         body=tuple(first),
         late_body=tuple(second),
@@ -299,23 +309,36 @@ def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lo
 
 def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.SX]:
     """Arrays of the generated step that formulas fill in, each as C reads it: row by row."""
-    # CasADi writes column by column: hence the transposes.
     outputs = {"H": ca.diag(reduced.H) if shape.diagonal else reduced.H}
     if shape.gradient:
         outputs["g"] = reduced.g
     if reduced.m_eq:
         outputs |= {"A": reduced.A, "b": reduced.b}
-    outputs |= {"lower": reduced.lower, "upper": reduced.upper, "J": lowered.tick.J_free.T}
+    # Bounds and offset as rows, where they are padded.
+    outputs |= {"lower": reduced.lower.T, "upper": reduced.upper.T, "J": lowered.tick.J_free}
     if not shape.direct_rows:
-        outputs["C"] = reduced.C.T
+        outputs["C"] = reduced.C
     if not shape.direct_command:
-        outputs["k"] = reduced.k
+        outputs["k"] = reduced.k.T
         if not shape.same:
-            outputs["K"] = reduced.K.T
+            outputs["K"] = reduced.K
     if shape.start:
         outputs["start"] = reduced.start
     return outputs
 
 
-def _size(name: str, value: ca.SX) -> int:
-    return value.size1() * padded(value.size2()) if name in _PADDED else value.numel()
+def _layout_of(name: str, shape: Shape) -> Layout:
+    if name in _PADDED or (shape.diagonal and name in _PADDED_IF_DIAGONAL):
+        return "rows"
+    return "columns" if shape.diagonal and name == "C" else "plain"
+
+
+def _aliases(outputs: dict[str, ca.SX], layouts: dict[str, Layout], cuts: Sequence[Cut]) -> dict[str, str]:
+    """Outputs that a kernel has written already, in the same layout: name to the kernel's array."""
+    found: dict[str, str] = {}
+    for cut in cuts:
+        for k, (symbol, layout) in enumerate(zip(cut.symbols, KERNELS[cut.kernel].results, strict=True)):
+            for name, value in outputs.items():
+                if layouts[name] == layout != "plain" and _identical(value, symbol):
+                    found[name] = f"{cut.kernel}_{k}"
+    return found

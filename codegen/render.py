@@ -65,7 +65,8 @@ def render_step(code: StepCode) -> dict[str, str]:
         "largest": max(n for n, _ in code.sizes),
         "modes": code.modes,
         "kernels": _kernels(code),
-        "most_joints": padded(code.nv),
+        "joint_stride": padded(code.nv),
+        "row_stride": padded(code.rows),
         "parameters": code.parameters,
         "inputs": code.inputs,
         "nv": code.nv,
@@ -95,12 +96,14 @@ def math_header() -> str:
 
 def _kernels(code: StepCode) -> str:
     """Source of the kernels that any mode calls."""
-    names = [kernel for mode in code.modes for kernel in mode.kernels]
+    names = ["common", *(kernel for mode in code.modes for kernel in mode.kernels)]
+    if any(mode.shape.diagonal for mode in code.modes):
+        names.append("one_row")
     if any(not mode.shape.diagonal for mode in code.modes):
         names.append("cholesky")
     if any(mode.m_eq for mode in code.modes):
         names.append("null_space")
-    return "\n".join(_template_text(f"kernels/{name}.h") for name in ("common", *dict.fromkeys(names))) if names else ""
+    return "\n".join(_template_text(f"kernels/{name}.h") for name in dict.fromkeys(names))
 
 
 def _template_text(name: str) -> str:

@@ -138,7 +138,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
     data |= rows
     data["x_feasible"] = _feasible_point(qp, formulation.name)
 
-    dense = {name: ca.densify(ca.simplify(data[name])) for name in DATA}
+    # Not simplified: CasADi takes sums apart that both sides of a row share.
+    dense = {name: ca.densify(data[name]) for name in DATA}
     cuts = [symbol for made in tick.cuts for symbol in made.symbols]
     function = ca.Function(
         "lowered",

@@ -15,11 +15,13 @@ typedef KINQP_VECTOR(long long, 32) kinqp_bits;
 #define KINQP_PARTS 1
 #define kinqp_part_fill(x) ((kinqp_part){(x), (x), (x), (x)})
 #define kinqp_part_root(x) ((kinqp_part)_mm256_sqrt_pd((__m256d)(x)))
+#define kinqp_bits_any(x) (((x)[0] | (x)[2] | (x)[1] | (x)[3]) != 0)
 #else
 typedef KINQP_VECTOR(double, 16) kinqp_part;
 typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 #define KINQP_PARTS 2
 #define kinqp_part_fill(x) ((kinqp_part){(x), (x)})
+#define kinqp_bits_any(x) (((x)[0] | (x)[1]) != 0)
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #define kinqp_part_root(x) ((kinqp_part)_mm_sqrt_pd((__m128d)(x)))
@@ -31,6 +33,7 @@ typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 #define kinqp_part_store(p, x) (*(kinqp_part *)(void *)(p) = (x))
 /* a where x > y, else b; and the same for a condition given as bits. */
 #define kinqp_part_choose(x, y, a, b) kinqp_bits_choose((kinqp_bits)((x) > (y)), a, b)
+#define kinqp_part_excludes_zero(lo, hi) kinqp_bits_any(~((kinqp_bits)((lo) <= 0.0) & (kinqp_bits)((hi) >= 0.0)))
 #define kinqp_bits_choose(where, a, b) ((kinqp_part)(((kinqp_bits)(a) & (where)) | ((kinqp_bits)(b) & ~(where))))
 #else
 #define KINQP_INLINE static inline
@@ -41,6 +44,7 @@ typedef double kinqp_part;
 #define kinqp_part_load(p) (*(p))
 #define kinqp_part_store(p, x) (*(p) = (x))
 #define kinqp_part_choose(x, y, a, b) ((x) > (y) ? (a) : (b))
+#define kinqp_part_excludes_zero(lo, hi) (!((lo) <= 0.0 && (hi) >= 0.0))
 #endif
 typedef struct {
     kinqp_part at[KINQP_PARTS];
