@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 TICKS_PER_MODE: Final = 200
 TOLERANCE: Final = 1e-9
-_FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno")
+_FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize")
 # The hand moves this much per tick [m/s, rad/s]; fast, so that a short record meets limits.
 _HAND_SPEED: Final = 0.4
 

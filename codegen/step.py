@@ -11,6 +11,7 @@ from ..formulations import InputError, Mode, check_input, get_formulation
 from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
+from . import qrqp
 from .model import identifier, step_code
 from .render import render_batch, render_step
 
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     Integers = NDArray[np.intc]
 
 SOLVER: Final = "active-set"
+SOLVERS: Final = (SOLVER, qrqp.NAME)
 _DOUBLE: Final = np.dtype(np.float64)
 _FAILED: Final = STATUSES.index(Status.FAILED)
 
@@ -107,6 +109,8 @@ class CompiledStep:
     robot : Robot
     formulation : Formulation
     mode : Mode
+    solver : {"active-set", "casadi-qrqp"}
+        The solver in the C code; see `compile_step`.
     feasible : bool
         Keep to admissible points: a tick that reaches `max_iterations` still gives a usable command.
     max_iterations : int, optional
@@ -123,6 +127,7 @@ class CompiledStep:
         robot: Robot,
         formulation: Formulation,
         mode: Mode,
+        solver: str = SOLVER,
         *,
         feasible: bool = False,
         max_iterations: int | None = None,
@@ -135,7 +140,7 @@ class CompiledStep:
         prefix = identifier(f"kinqp_{robot.name}_{formulation.name}")
         code = step_code(robot, formulation, [mode], prefix)
         self.code: Final[StepCode] = code
-        files = render_step(code)
+        files = render_step(code) if solver == SOLVER else qrqp.render_qrqp(code, formulation, robot, mode)
         batch = render_batch(code)
         ffi = cffi.FFI()
         prototype = "void " + batch.partition("void ")[2].partition(";")[0] + ";"
@@ -316,8 +321,9 @@ def compile_step(
         A registered name, `module:Name`, or an instance.
     mode : str or Mode
         As in `Mode.parse`, or an instance.
-    solver : {"active-set"}
-        The solver in the C code.
+    solver : {"active-set", "casadi-qrqp"}
+        The solver in the C code: our own, or the one that CasADi generates, to compare with. That tells no iterations
+        (-1) and takes neither `feasible` nor `max_iterations`.
     feasible, max_iterations
         See `CompiledStep`.
 
@@ -328,12 +334,16 @@ def compile_step(
     CompilerError
         When there is no C compiler, or it fails.
     """
-    if solver != SOLVER:
-        raise ValueError(f"solver: expected {SOLVER!r}, the one that is generated as C, got {solver!r}; see make_step")
+    if solver not in SOLVERS:
+        known = ", ".join(SOLVERS)
+        raise ValueError(f"solver: expected one that is generated as C ({known}), got {solver!r}; see make_step")
+    if solver == qrqp.NAME and (feasible or max_iterations is not None):
+        raise ValueError(f"feasible, max_iterations: expected neither with {solver}, which doesn't take them")
     return CompiledStep(
         robot,
         get_formulation(formulation),
         Mode.parse(mode) if isinstance(mode, str) else mode,
+        solver,
         feasible=feasible,
         max_iterations=max_iterations,
     )
