@@ -23,7 +23,7 @@ from ..benchmarks import (
     sweep_table,
 )
 from ..codegen import ExportError, export_c
-from ..formulations import MODE_NAMES, ModeError, available_formulations, get_formulation
+from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
@@ -34,9 +34,11 @@ from .interrupt import interruptible
 USER_ERRORS = (
     CompilerError,
     ConfigError,
+    DeclarationError,
     ExportError,
     ModeError,
     OptionError,
+    PlotError,
     PluginError,
     RobotError,
     StoreError,
@@ -128,6 +130,23 @@ def run_export(
     console.print(f"Wrote {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))} to {folder}.")
     build = folder / "build"
     console.print(f"Next: cmake -S {folder} -B {build} && cmake --build {build} && ctest --test-dir {build}")
+
+
+@app.command("describe")
+def run_describe(
+    robot: Annotated[str, typer.Option(help="Registered name, or a URDF file.")],
+    formulation: Annotated[str, typer.Option(help="Registered name, or module:Name.")],
+    mode: Annotated[str, typer.Option(help="Motion mode, e.g. fix-orientation or line:z.")],
+    spy: Annotated[Path | None, typer.Option(help="Draw the KKT matrix's pattern to this .png or .svg.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Frame at the tool centre point, where the URDF branches.")] = None,
+) -> None:
+    """Print the problem as Markdown with LaTeX: dimensions, named rows, run-time inputs."""
+    arm, made = load_robot(robot, tip=tip), get_formulation(formulation)
+    # Not through Rich: Markdown in a file must not be wrapped.
+    typer.echo(made.describe(arm, mode), nl=False)
+    if spy is not None:
+        written = made.spy(arm, mode, spy)
+        Console(stderr=True, soft_wrap=True).print(f"Wrote {written}. Next: kinqp export, to have it as C.")
 
 
 def _console() -> Console:

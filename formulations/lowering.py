@@ -66,6 +66,8 @@ class Lowered:
     rows : RowNames
     constant : dict of str to ndarray of bool
         For each of `DATA`, which entries do not depend on the inputs.
+    program : QuadraticProgram
+        The declaration itself, term by term, in the symbols of `tick`.
     """
 
     formulation: Formulation
@@ -77,6 +79,7 @@ class Lowered:
     variables: dict[str, slice]
     rows: RowNames
     constant: dict[str, NDArray[np.bool_]]
+    program: QuadraticProgram
 
     @property
     def n(self) -> int:
@@ -121,6 +124,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
         weighted = ca.repmat(term.weight, 1, n) * slope
         data["H"] += slope.T @ weighted
         data["g"] += weighted.T @ offset
+    for cost in qp.costs:
+        data["g"] += _affine(cost.expression, x, f"{formulation.name}, {cost.name}")[0].T
     data["K"], data["k"] = _affine(qp.command_expression, x, f"{formulation.name}, command")
     if data["k"].size1() != robot.nv:
         raise DeclarationError(
@@ -141,7 +146,7 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
         for end, (name, variable) in zip(ends, qp.variables.items(), strict=True)
     }
     constant = {name: _constant_entries(dense[name]) for name in DATA}
-    return Lowered(formulation, robot, mode, tick, tick.inputs, function, variables, names, constant)
+    return Lowered(formulation, robot, mode, tick, tick.inputs, function, variables, names, constant, qp)
 
 
 def _affine(expression: ca.SX, x: ca.SX, label: str) -> tuple[ca.SX, ca.SX]:
