@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from ..formulations import lower
+from .definite import require_definite
 from .emit import emit, number
 from .reduction import Reduced, reduce
 
@@ -164,6 +165,7 @@ def _field(given: Input) -> Field:
 
 def _mode_code(lowered: Lowered) -> ModeCode:
     reduced = reduce(lowered)
+    require_definite(lowered, reduced)
     gradient = not reduced.g.is_zero()
     diagonal = reduced.diagonal and not gradient and not reduced.m_eq
     outputs = _outputs(lowered, reduced, gradient=gradient, diagonal=diagonal)

@@ -146,8 +146,11 @@ def _check(problem: cvxpy.Problem, command: cvxpy.Expression, name: str) -> None
             raise DeclarationError(
                 f"{name}, {label}: expected a DPP problem, which never multiplies two Parameters, got {part}"
             )
-    if not problem.is_qp():
-        raise DeclarationError(f"{name}, problem: expected a QP (quadratic objective, affine rows), got {problem}")
+    alone = [(cvxpy.Problem(problem.objective), problem.objective, "objective")]
+    alone += [(cvxpy.Problem(cvxpy.Minimize(0), [part]), part, label) for part, label in _labelled(problem)]
+    for single, part, label in alone:
+        if not single.is_qp():
+            raise DeclarationError(f"{name}, {label}: expected a QP (quadratic objective, affine rows), got {part}")
     if not command.is_affine():
         raise DeclarationError(f"{name}, command: expected an affine expression, got {command}")
     strangers = [v.name() for v in command.variables() if v.id not in {own.id for own in problem.variables()}]

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: What an infinite side becomes where only the inputs make it so; solvers take this much for "absent".
 INFINITE: Final = 1e20
+# cvxpy's word, and the one that cvxpygen's solvers leave behind.
+_SOLVED: Final = (cvxpy.OPTIMAL, "solved")
 
 
 class NotSolvedError(RuntimeError):
@@ -123,8 +125,7 @@ class CvxpyProblem:
         NotSolvedError
             When `set` was not called, or the problem's status is not optimal.
         """
-        solved = self.problem.status in (cvxpy.OPTIMAL, cvxpy.OPTIMAL_INACCURATE)
-        if self._command is None or not solved:
+        if self._command is None or str(self.problem.status).lower() not in _SOLVED:
             raise NotSolvedError(f"command: expected set() and a solved problem, got status {self.problem.status}")
         K, k = self._command
         return np.asarray(K @ np.concatenate([variable.value for variable in self.variables.values()]) + k)
