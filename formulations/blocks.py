@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from .program import Rows
+
     Array = NDArray[np.float64]
 
 
@@ -37,6 +39,11 @@ def split(expression: ca.SX, variables: Mapping[str, ca.SX]) -> Affine:
     slopes = {name: ca.sparsify(ca.jacobian(expression, symbol)) for name, symbol in variables.items()}
     offset = ca.substitute(expression, x, ca.SX.zeros(x.size1(), 1))
     return Affine({name: slope for name, slope in slopes.items() if slope.nnz()}, offset)
+
+
+def split_rows(rows: Rows, variables: Mapping[str, ca.SX]) -> Affine:
+    """Take rows apart; both sides of an equality may hold variables: its rows then say slopes x + offset = 0."""
+    return split(rows.expression - rows.lower if rows.upper is None else rows.expression, variables)
 
 
 def constant(matrix: ca.SX) -> Array | None:

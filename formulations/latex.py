@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from ..robots import RobotError
-from .blocks import constant, multiple_of_identity, split
+from .blocks import constant, multiple_of_identity, split, split_rows
 from .tick import Tick
 
 if TYPE_CHECKING:
@@ -82,10 +82,10 @@ class Notation:
 
     def rows(self, rows: Rows) -> str:
         """Write named rows."""
-        parts = split(rows.expression, self._variables)
+        parts = split_rows(rows, self._variables)
         left = self._sum(parts.slopes, rows.name) or "0"
         if rows.upper is None:
-            return f"{left} = {self._column(rows.lower - parts.offset, 'b', rows.name)}"
+            return f"{left} = {self._column(-parts.offset, 'b', rows.name)}"
         lower, upper = (
             None if _infinite(side) else self._column(side - parts.offset, "b", f"{rows.name}, {word} side")
             for word, side in (("lower", rows.lower), ("upper", rows.upper))

@@ -11,7 +11,7 @@ import numpy as np
 from cvxpy.atoms.affine.binary_operators import multiply
 from cvxpy.atoms.sum_squares import sum_squares
 
-from .blocks import constant, is_diagonal, multiple_of_identity, split
+from .blocks import constant, is_diagonal, multiple_of_identity, split, split_rows
 from .inputs import complete_inputs
 from .lowering import lower
 
@@ -82,7 +82,7 @@ class CvxpyProblem:
                 self._column(f"{cost.name} {name}", s.T) @ self.variables[name] for name, s in slopes.items()
             )
         for rows in program.rows:
-            self.constraints[rows.name] = self._rows(rows, split(rows.expression, program.variables))
+            self.constraints[rows.name] = self._rows(rows, split_rows(rows, program.variables))
         flat = [constraint for made in self.constraints.values() for constraint in made]
         self.problem: Final = cvxpy.Problem(cvxpy.Minimize(objective), flat)
         outputs = [ca.densify(value) for value in self._values.values()]
@@ -139,7 +139,7 @@ class CvxpyProblem:
         if expression is None:  # rows of numbers and inputs alone: feasible or not, but still rows
             expression = cvxpy.Constant(np.zeros(parts.offset.size1()))
         if rows.upper is None:
-            sides = [(expression == self._column(f"{rows.name} equals", rows.lower - parts.offset))]
+            sides = [(expression == self._column(f"{rows.name} equals", -parts.offset))]
         else:
             sides = []
             for word, side in (("lower", rows.lower), ("upper", rows.upper)):
