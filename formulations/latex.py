@@ -74,11 +74,14 @@ class Notation:
     def cost(self, cost: Cost) -> str:
         """Write a linear cost."""
         slopes = split(cost.expression, self._variables).slopes
-        products = [
-            rf"{self._column(slope.T, 'c', f'{cost.name}, factor of {name}')}^\top {self.variable(name)}"
-            for name, slope in slopes.items()
-        ]
-        return " + ".join(products) or "0"
+        return " + ".join(self._price(slope.T, name, cost.name) for name, slope in slopes.items()) or "0"
+
+    def _price(self, column: ca.SX, variable: str, name: str) -> str:
+        x, numbers = self.variable(variable), constant(column)
+        if numbers is not None and np.all(numbers == numbers[0, 0]):
+            ones = "" if numbers.size == 1 else r"1^\top "
+            return rf"{numbers[0, 0]:g}\, {ones}{x}"
+        return rf"{self._column(column, 'c', f'{name}, factor of {variable}')}^\top {x}"
 
     def rows(self, rows: Rows) -> str:
         """Write named rows."""
