@@ -110,7 +110,7 @@ class _Declaration:
         return ca.vec(ca.densify(quantity))
 
     def _definitions(self) -> dict[int, int]:
-        """Find auxiliary variables that a row defines: unbounded, in no other row, with a constant +-1 in front.
+        """Find auxiliary variables that a row defines: unbounded, in no other row, with a constant in front.
 
         cvxpy makes one for every sum of squares. Put in, the residual takes its place, so that H is as definite as the
         problem was written.
@@ -127,7 +127,7 @@ class _Declaration:
                 rows = self.A[:, j].sparsity().row()
                 alone = len(rows) == 1 and rows[0] in equalities and j not in in_products
                 free = alone and rows[0] not in found.values()
-                if free and self.A[rows[0], j].is_constant() and abs(float(self.A[rows[0], j])) == 1.0:
+                if free and self.A[rows[0], j].is_constant():
                     found[j] = rows[0]
         return found
 
@@ -152,19 +152,17 @@ class _Declaration:
             self.qp.minimize_linear(cost, name="linear cost")
 
     def _forms(self, x: ca.SX, coupled: list[int]) -> None:
-        """Take quadratic forms apart: P is a sum of parameters times constant matrices, each of one sign by DCP."""
+        """Take quadratic forms apart: P is a sum of parameters, none negative by DCP, times matrices that are convex."""
         n, tensor = self.canonical.n, self.canonical.P
         for k in range(tensor.shape[1]):
             matrix = tensor[:, [k]].toarray().reshape(n, n, order="F")[np.ix_(coupled, coupled)]
             if not matrix.any():
                 continue
             values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
-            largest = float(np.max(np.abs(values)))
-            kept = np.abs(values) > _FLAT * largest
-            sign = float(np.sign(values[np.argmax(np.abs(values))]))
-            factor = np.sqrt(np.abs(values[kept]))[:, None] * vectors[:, kept].T
+            kept = values > _FLAT * values[-1]
+            factor = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
             self.qp.minimize(
-                ca.mtimes(ca.DM(factor), x[coupled]), weight=sign * self.theta[k], name=f"form {len(self.qp.terms) + 1}"
+                ca.mtimes(ca.DM(factor), x[coupled]), weight=self.theta[k], name=f"form {len(self.qp.terms) + 1}"
             )
 
     def _rows(self, x: ca.SX, used: set[int]) -> None:

@@ -23,7 +23,6 @@ def test_markdown_comes_out_as_it_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ((*WORDS, "sideways"), "mode: expected one of"),
         ((*WORDS, "line:z", "--spy", "kkt.txt"), "path: expected a file name that ends in .png or .svg, got kkt.txt"),
         (
             (*WORDS[:4], "tests.formulations.in_cvxpy:joint_space", "--mode", "free"),
