@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, ClassVar
 from .bounds import BOUNDS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import cvxpy
+    from numpy.typing import ArrayLike
 
     from ..robots import Robot
     from .modes import Mode
@@ -57,7 +59,12 @@ class Formulation(ABC):
 
     @staticmethod
     def from_cvxpy(
-        problem: cvxpy.Problem, *, command: cvxpy.Expression, name: str, bounds: str = "viable"
+        problem: cvxpy.Problem,
+        *,
+        command: cvxpy.Expression,
+        name: str,
+        feasible: Mapping[str, cvxpy.Expression | ArrayLike] | None = None,
+        bounds: str = "viable",
     ) -> Formulation:
         """Make a formulation of a problem written in cvxpy.
 
@@ -73,6 +80,9 @@ class Formulation(ABC):
             What the robot is sent, affine in the problem's variables [rad/s or m/s].
         name : str
             In kebab-case.
+        feasible : mapping of str to cvxpy.Expression or numbers, optional
+            A point that satisfies all rows whatever the state, as `QuadraticProgram.feasible` wants it: values of all
+            variables, by name, in Parameters and numbers.
         bounds : {"viable", "thesis"}
             As of every formulation.
 
@@ -89,7 +99,7 @@ class Formulation(ABC):
         """
         from .from_cvxpy import from_cvxpy
 
-        return from_cvxpy(problem, command, name, bounds)
+        return from_cvxpy(problem, command, name, feasible or {}, bounds)
 
     def to_cvxpy(self, robot: Robot, mode: str | Mode) -> CvxpyProblem:
         """Give the problem as a DPP problem of cvxpy with named Parameters, for a robot in a mode.

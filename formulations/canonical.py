@@ -17,10 +17,11 @@ from cvxpy.reductions.eliminate_zero_sized import EliminateZeroSized
 from .program import DeclarationError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
-# The variable that stands for the command while cvxpy works out its affine map.
-_COMMAND: Final = "kinqp command"
+_POINT: Final = "feasible point, "
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,8 @@ class Canonical:
     unknowns : tuple of Unknown
     command : Unknown
         Equal to the command by the rows that define it.
+    feasible : dict of str to Unknown
+        Equal to what the feasible point says of the variables of these names.
     parameters : tuple of Given
     blocks : tuple of Block
     """
@@ -82,11 +85,12 @@ class Canonical:
     A: Any
     unknowns: tuple[Unknown, ...]
     command: Unknown
+    feasible: dict[str, Unknown]
     parameters: tuple[Given, ...]
     blocks: tuple[Block, ...]
 
 
-def canonicalise(problem: object, command: object, name: str) -> Canonical:
+def canonicalise(problem: object, command: object, name: str, feasible: Mapping[str, object]) -> Canonical:
     """Have cvxpy work out the maps, after checking that it can.
 
     Parameters
@@ -97,6 +101,8 @@ def canonicalise(problem: object, command: object, name: str) -> Canonical:
         Affine in the problem's variables.
     name : str
         Of the formulation, for messages.
+    feasible : mapping of str to cvxpy.Expression or numbers
+        A feasible point, by names of variables.
 
     Raises
     ------
@@ -107,34 +113,39 @@ def canonicalise(problem: object, command: object, name: str) -> Canonical:
         raise DeclarationError(f"{name}, problem: expected a cvxpy.Problem, got {problem!r}")
     if not isinstance(command, cvxpy.Expression):
         raise DeclarationError(f"{name}, command: expected a cvxpy expression of the joint velocities, got {command!r}")
-    _check(problem, command, name)
-    stand_in = cvxpy.Variable(command.shape, name=_COMMAND)
+    _check_problem(problem, name)
+    expressions = {"command": command} | _feasible_point(problem, feasible, name)
+    # Variables that stand for expressions, while cvxpy works out their affine maps with all else.
+    stand_ins = {label: cvxpy.Variable(expression.shape) for label, expression in expressions.items()}
+    definitions = [stand_ins[label] == expression for label, expression in expressions.items()]
+    for (label, expression), definition in zip(expressions.items(), definitions, strict=True):
+        _check_expression(problem, expression, definition, f"{name}, {label}")
     sign = 1.0 if isinstance(problem.objective, cvxpy.Minimize) else -1.0
     objective = cvxpy.Minimize(sign * problem.objective.args[0])
-    extended = cvxpy.Problem(objective, [*problem.constraints, stand_in == command])
-    if not extended.is_dpp():
-        raise DeclarationError(f"{name}, command: expected an expression that follows the rules of DPP, got {command}")
+    extended = cvxpy.Problem(objective, [*problem.constraints, *definitions])
+    _check_names(extended.parameters(), name)
     attributes = CvxAttr2Constr(reduce_bounds=True)
     stuffing = ConeMatrixStuffing(quad_obj=True)
     chain = Chain(reductions=[Dcp2Cone(quad_obj=True), attributes, EliminateZeroSized(), stuffing])
     program, _ = chain.apply(extended)
-    n = program.x.size
     replaced = {new: old for old, (new,) in attributes.var_id_map.items()}
-    unknowns = _unknowns(extended, replaced, program)
+    found = {variable: _columns(program, stand_in.id) for variable, stand_in in stand_ins.items()}
+    known = {variable: Unknown(variable, columns, own=False) for variable, columns in found.items()}
     return Canonical(
-        n=n,
+        n=program.x.size,
         m=program.constr_size,
         P=program.P.tocsc(),
         q=program.q.tocsc(),
         A=program.A.tocsc(),
-        unknowns=tuple(unknown for unknown in unknowns if unknown.name != _COMMAND),
-        command=next(unknown for unknown in unknowns if unknown.name == _COMMAND),
+        unknowns=_unknowns(problem, replaced, program, {stand_in.id for stand_in in stand_ins.values()}),
+        command=known["command"],
+        feasible={label.removeprefix(_POINT): unknown for label, unknown in known.items() if label.startswith(_POINT)},
         parameters=_parameters(extended, program),
         blocks=_blocks(problem, program),
     )
 
 
-def _check(problem: cvxpy.Problem, command: cvxpy.Expression, name: str) -> None:
+def _check_problem(problem: cvxpy.Problem, name: str) -> None:
     if problem.is_mixed_integer():
         raise DeclarationError(f"{name}, problem: expected continuous variables, got integer or boolean ones")
     if any(leaf.is_complex() for leaf in (*problem.variables(), *problem.parameters())):
@@ -151,13 +162,36 @@ def _check(problem: cvxpy.Problem, command: cvxpy.Expression, name: str) -> None
     for single, part, label in alone:
         if not single.is_qp():
             raise DeclarationError(f"{name}, {label}: expected a QP (quadratic objective, affine rows), got {part}")
-    if not command.is_affine():
-        raise DeclarationError(f"{name}, command: expected an affine expression, got {command}")
-    strangers = [v.name() for v in command.variables() if v.id not in {own.id for own in problem.variables()}]
+
+
+def _feasible_point(problem: cvxpy.Problem, feasible: Mapping[str, object], name: str) -> dict[str, cvxpy.Expression]:
+    own = {variable.name(): variable for variable in problem.variables()}
+    point: dict[str, cvxpy.Expression] = {}
+    for label, value in feasible.items():
+        if label not in own:
+            raise DeclarationError(f"{name}, {_POINT}{label}: expected a variable among {', '.join(own)}")
+        expression = value if isinstance(value, cvxpy.Expression) else cvxpy.Constant(value)
+        if expression.shape != own[label].shape or expression.variables():
+            wanted = f"Parameters and numbers of shape {own[label].shape}"
+            raise DeclarationError(f"{name}, {_POINT}{label}: expected {wanted}, got {expression}")
+        point[_POINT + label] = expression
+    return point
+
+
+def _check_expression(problem: cvxpy.Problem, expression: cvxpy.Expression, definition: Any, label: str) -> None:
+    if not expression.is_affine():
+        raise DeclarationError(f"{label}: expected an affine expression, got {expression}")
+    own = {variable.id for variable in problem.variables()}
+    strangers = [variable.name() for variable in expression.variables() if variable.id not in own]
     if strangers:
-        raise DeclarationError(f"{name}, command: expected variables of the problem, got {', '.join(strangers)}")
+        raise DeclarationError(f"{label}: expected variables of the problem, got {', '.join(strangers)}")
+    if not definition.is_dcp(dpp=True):
+        raise DeclarationError(f"{label}: expected an expression that follows the rules of DPP, got {expression}")
+
+
+def _check_names(parameters: Sequence[cvxpy.Parameter], name: str) -> None:
     names: set[str] = set()
-    for parameter in {p.id: p for p in (*problem.parameters(), *command.parameters())}.values():
+    for parameter in parameters:
         label = parameter.name()
         if not label.isidentifier() or label == f"param{parameter.id}":
             raise DeclarationError(
@@ -172,20 +206,27 @@ def _labelled(problem: cvxpy.Problem) -> list[tuple[Any, str]]:
     return [(c, c.label or f"constraint {k}") for k, c in enumerate(problem.constraints, start=1)]
 
 
-def _unknowns(problem: cvxpy.Problem, replaced: dict[int, int], program: Any) -> list[Unknown]:
+def _columns(program: Any, variable: int) -> slice:
+    start = program.var_id_to_col[variable]
+    return slice(start, start + program.id_to_var[variable].size)
+
+
+def _unknowns(
+    problem: cvxpy.Problem, replaced: dict[int, int], program: Any, left_out: set[int]
+) -> tuple[Unknown, ...]:
     own = {variable.id: variable for variable in problem.variables()}
     made: list[Unknown] = []
     names: set[str] = set()
     for variable in sorted(program.variables, key=lambda v: program.var_id_to_col[v.id]):
-        start = program.var_id_to_col[variable.id]
+        if variable.id in left_out:
+            continue
         # Variables with attributes (nonneg, say) are replaced by plain ones and rows.
         original = own.get(replaced.get(variable.id, variable.id))
         # cvxpy numbers what has no name by a count that depends on all that was made before.
         named = original is not None and original.name() != f"var{original.id}"
         label = original.name() if original is not None and named else "x" if original is not None else "auxiliary"
-        label = unique(label, names)
-        made.append(Unknown(label, slice(start, start + variable.size), original is not None and label != _COMMAND))
-    return made
+        made.append(Unknown(unique(label, names), _columns(program, variable.id), own=original is not None))
+    return tuple(made)
 
 
 def unique(name: str, names: set[str]) -> str:

@@ -14,6 +14,8 @@ from .canonical import Canonical, canonicalise, unique
 from .program import DeclarationError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from .canonical import Block, Given
     from .program import QuadraticProgram
     from .tick import Tick
@@ -23,11 +25,11 @@ _FLAT: Final = 1e-14
 _NAME: Final = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 
 
-def from_cvxpy(problem: object, command: object, name: str, bounds: str) -> Formulation:
+def from_cvxpy(problem: object, command: object, name: str, feasible: Mapping[str, object], bounds: str) -> Formulation:
     """Make the formulation; see `Formulation.from_cvxpy`."""
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise DeclarationError(f"name: expected kebab-case as in 'joint-space', got {name!r}")
-    canonical, given_name = canonicalise(problem, command, name), name
+    canonical, given_name = canonicalise(problem, command, name, feasible), name
 
     @final
     @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class _Declaration:
         self._objective(x)
         self._rows(x, set(definitions.values()))
         qp.command(x[canonical.command.columns])
+        qp.feasible(**{name: x[unknown.columns] for name, unknown in canonical.feasible.items()})
 
     def _matrix(self, tensor: Any, rows: int, columns: int) -> ca.SX:
         return ca.reshape(ca.sparsify(ca.mtimes(_to_casadi(tensor), self.theta)), rows, columns)
@@ -121,8 +124,9 @@ class _Declaration:
         }
         coupled = ca.sparsify(self.P - ca.diag(ca.diag(self.P)))
         in_products = {j for j in range(canonical.n) if coupled[:, j].nnz()}
+        auxiliary = (unknown for unknown in canonical.unknowns if not unknown.own)
         found: dict[int, int] = {}
-        for unknown in (*(u for u in canonical.unknowns if not u.own), canonical.command):
+        for unknown in (*auxiliary, canonical.command, *canonical.feasible.values()):
             for j in range(unknown.columns.start, unknown.columns.stop):
                 rows = self.A[:, j].sparsity().row()
                 alone = len(rows) == 1 and rows[0] in equalities and j not in in_products
@@ -152,7 +156,7 @@ class _Declaration:
             self.qp.minimize_linear(cost, name="linear cost")
 
     def _forms(self, x: ca.SX, coupled: list[int]) -> None:
-        """Take quadratic forms apart: P is a sum of parameters, none negative by DCP, times matrices that are convex."""
+        """Take quadratic forms apart: P is a sum of parameters, none negative by DCP, times convex ones."""
         n, tensor = self.canonical.n, self.canonical.P
         for k in range(tensor.shape[1]):
             matrix = tensor[:, [k]].toarray().reshape(n, n, order="F")[np.ix_(coupled, coupled)]

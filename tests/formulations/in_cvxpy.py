@@ -32,13 +32,17 @@ def joint_space(nv: int = NV, m_free: int = M_FREE, m_fixed: int = M_FIXED) -> F
     weight = parameter("joint_weight", nv, nonneg=True, value=np.full(nv, DEFAULT_JOINT_WEIGHT))
     task_weight = parameter("task_weight", m_free, nonneg=True, value=np.ones(m_free))
     eps, qd = cp.Variable(m_free, name="eps"), cp.Variable(nv, name="qd")
-    rows = [(parameter("J_free", m_free, nv) @ qd - eps == parameter("v", m_free)).set_label("task")]
+    v = parameter("v", m_free)
+    rows = [(parameter("J_free", m_free, nv) @ qd - eps == v).set_label("task")]
     if m_fixed:
         rows.append((parameter("J_fixed", m_fixed, nv) @ qd == parameter("v_fixed", m_fixed)).set_label("mode"))
     rows.append((parameter("qd_lo", nv) <= qd).set_label("joint limits"))
     rows.append((qd <= parameter("qd_hi", nv)).set_label("joint limits"))
     cost = 0.5 * total(multiply(task_weight, cp.square(eps))) + 0.5 * total(multiply(weight, cp.square(qd)))
-    return Formulation.from_cvxpy(cp.Problem(cp.Minimize(cost), rows), command=qd, name="joint-space-in-cvxpy")
+    standing = {"eps": -v, "qd": np.zeros(nv)}
+    return Formulation.from_cvxpy(
+        cp.Problem(cp.Minimize(cost), rows), command=qd, name="joint-space-in-cvxpy", feasible=standing
+    )
 
 
 def unnamed() -> Formulation:

@@ -263,6 +263,46 @@ def test_what_is_refused_in_one_sentence(message: str, make: Callable[[], tuple[
     assert "\n" not in str(caught.value)
 
 
+def test_a_feasible_point_is_that_of_ours_while_nothing_drifts() -> None:
+    theirs, ours = (
+        Evaluator(lower(joint_space(), ROBOT, MODE)),
+        evaluator("lbr_med14", "joint-space", "fix-orientation"),
+    )
+    given = {"q": np.full(NV, 0.4), "v": np.array([0.1, -0.2, 0.3])}
+    point, wanted = theirs(**given).qp.x_feasible, ours(**given).qp.x_feasible
+    assert point is not None
+    assert wanted is not None
+    np.testing.assert_array_equal(point, wanted)
+    np.testing.assert_array_equal(point, [-0.1, 0.2, -0.3, *np.zeros(NV)])
+    # What needs one can be used: the thesis's solver, and C that keeps to admissible points when it runs out of steps.
+    step = make_step(ROBOT, joint_space(), MODE, "thesis-active-set")
+    assert step(**given).status is Status.SOLVED
+    with mock.patch.object(step_module, "STEP_FLAGS", QUICK_FLAGS):
+        stopped = compile_step(ROBOT, joint_space(), MODE, feasible=True, max_iterations=0)
+    on_limit = np.deg2rad([0.0, 40.0, 0.0, -119.999, 0.0, 20.0, 0.0])
+    result = stopped(on_limit, [-0.3, 0.0, 0.0])
+    assert result.status is Status.MAX_ITERATIONS
+    assert result.qd[3] >= numbers_at(on_limit).qd_lo[3] - 1e-9
+
+
+def numbers_at(q: Array) -> Instance:
+    return evaluator("lbr_med14", "joint-space", "fix-orientation")(q=q, v=np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("feasible", "message"),
+    [
+        ({"y": 0.0}, "refused, feasible point, y: expected a variable among x"),
+        ({"x": np.zeros(3)}, r"refused, feasible point, x: expected Parameters and numbers of shape \(7,\)"),
+        ({"x": X}, r"refused, feasible point, x: expected Parameters and numbers of shape \(7,\)"),
+        ({"x": multiply(Q, Q)}, "refused, feasible point, x: expected an expression that follows the rules of DPP"),
+    ],
+)
+def test_feasible_points_are_refused_too(feasible: dict[str, Any], message: str) -> None:
+    with pytest.raises(DeclarationError, match=f"^{message}"):
+        Formulation.from_cvxpy(with_rows(), command=X, name="refused", feasible=feasible)
+
+
 def test_names_are_kebab_case() -> None:
     with pytest.raises(DeclarationError, match=r"^name: expected kebab-case as in 'joint-space', got 'Joint Space'"):
         Formulation.from_cvxpy(with_rows(), command=X, name="Joint Space")
