@@ -41,23 +41,29 @@ _DEPTH: Final = 2
 
 
 class Notation:
-    """LaTeX for the parts of a lowered formulation.
-
-    Attributes
-    ----------
-    legend : list of (symbol, what it stands for, shape, whether it changes)
-        Of the letters given so far.
-    """
+    """LaTeX for the parts of a lowered formulation."""
 
     def __init__(self, lowered: Lowered) -> None:
         self._lowered: Final = lowered
         self._variables: Final = lowered.program.variables
         self._known: Final = _quantities(lowered)
-        self.legend: Final[list[tuple[str, str, str, str]]] = []
+        self._letters: Final[dict[str, tuple[ca.SX, list[str]]]] = {}
+
+    @property
+    def legend(self) -> list[tuple[str, ...]]:
+        """Of the letters given so far: symbol, what it stands for, shape, whether it changes."""
+        lines: list[tuple[str, ...]] = []
+        for symbol, (value, meanings) in self._letters.items():
+            rows, columns = value.shape
+            shape = f"{rows}" if columns == 1 else f"{rows} x {columns}"
+            entries = "constant" if value.is_constant() else "change every tick"
+            lines.append((f"${symbol}$", "; ".join(meanings), shape, entries))
+        return lines
 
     def variable(self, name: str) -> str:
         """Write a variable's or quantity's name."""
-        return _LATEX.get(name) or (name if len(name) == 1 else rf"\mathrm{{{self.text(name)}}}")
+        words = "text" if " " in name else "mathrm"
+        return _LATEX.get(name) or (name if len(name) == 1 else rf"\{words}{{{self.text(name)}}}")
 
     def text(self, text: str) -> str:
         """Escape what LaTeX would take for something else."""
@@ -127,22 +133,30 @@ class Notation:
         return self._recognise(column) or self._letter(letter, meaning, column)
 
     def _recognise(self, value: ca.SX) -> str | None:
-        dense = ca.densify(value)
         for name, quantity in self._known.items():
-            if quantity.shape == dense.shape:
-                if ca.is_equal(dense, quantity, _DEPTH):
-                    return self.variable(name)
-                if ca.is_equal(-dense, quantity, _DEPTH):
-                    return f"-{self.variable(name)}"
+            sign = _sign(value, quantity)
+            if sign is not None:
+                return sign + self.variable(name)
         return None
 
     def _letter(self, letter: str, meaning: str, value: ca.SX) -> str:
-        count = sum(symbol.startswith(f"${letter}_") for symbol, *_ in self.legend) + 1
-        symbol = f"{letter}_{{{count}}}"
-        rows, columns = value.shape
-        shape = f"{rows}" if columns == 1 else f"{rows} x {columns}"
-        self.legend.append((f"${symbol}$", meaning, shape, "constant" if value.is_constant() else "change every tick"))
+        alike = {symbol: known for symbol, known in self._letters.items() if symbol[0] == letter}
+        for symbol, (known, meanings) in alike.items():
+            sign = _sign(value, known)
+            if sign is not None:
+                meanings.append(sign + meaning)
+                return sign + symbol
+        symbol = f"{letter}_{{{len(alike) + 1}}}"
+        self._letters[symbol] = (ca.densify(value), [meaning])
         return symbol
+
+
+def _sign(value: ca.SX, known: ca.SX) -> str | None:
+    """Give "" where two expressions are the same, "-" where one is the other's negative, None where neither."""
+    dense = ca.densify(value)
+    if dense.shape != known.shape:
+        return None
+    return "" if ca.is_equal(dense, known, _DEPTH) else "-" if ca.is_equal(-dense, known, _DEPTH) else None
 
 
 def _quantities(lowered: Lowered) -> dict[str, ca.SX]:

@@ -63,7 +63,7 @@ class CvxpyProblem:
         self.lowered: Final[Lowered] = lower(formulation, robot, mode)
         program = self.lowered.program
         self.variables: Final = {
-            name: cvxpy.Variable(symbol.size1(), name=name) for name, symbol in program.variables.items()
+            name: cvxpy.Variable(symbol.size1(), name=_identifier(name)) for name, symbol in program.variables.items()
         }
         self.parameters: Final[dict[str, cvxpy.Parameter]] = {}
         self.constraints: Final[dict[str, list[Any]]] = {}
@@ -169,14 +169,18 @@ class CvxpyProblem:
         return self._parameter(name, column, column.shape[:1]) if numbers is None else numbers[:, 0]
 
     def _parameter(self, name: str, value: ca.SX, shape: tuple[int, ...]) -> cvxpy.Parameter:
-        # cvxpygen makes C identifiers of them.
-        label = plain = re.sub(r"\W+", "_", name).strip("_")
+        label = plain = _identifier(name)
         count = 2
         while label in self.parameters:
             label, count = f"{plain}_{count}", count + 1
         self.parameters[label] = cvxpy.Parameter(shape, name=label)
         self._values[label] = value
         return self.parameters[label]
+
+
+def _identifier(name: str) -> str:
+    """Turn a declared name into what cvxpygen can make a C identifier of."""
+    return re.sub(r"\W+", "_", name).strip("_")
 
 
 def _infinite(side: ca.SX) -> bool:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
 from matplotlib import image
 
-from kinqp.formulations import Mode, PlotError, available_formulations, get_formulation, lower
+from kinqp.formulations import Formulation, Mode, PlotError, available_formulations, get_formulation, lower
 from kinqp.formulations.spy import CHANGING, CONSTANT, kkt_pattern
 from tests.formulations.inputs import varied
 from tests.formulations.reference import MODES, evaluator
@@ -19,6 +20,7 @@ from tests.robots.arms import arm
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from kinqp.formulations import QuadraticProgram, Tick
     from kinqp.solvers import QP
     from tests.formulations.reference import Array
 
@@ -81,6 +83,31 @@ def test_what_has_no_name_gets_a_letter_and_a_legend() -> None:
     assert "| $A_{1}$ | rest, factor of qd | 8 x 7 | constant |" in text
     assert "| $r_{1}$ | offset of rest | 8 | change every tick |" in text
     assert table(text, "Rows")[:2] == [["partly", "bound", "3", "x[0-1, 7]"], ["above", "two-sided", "2", "C[0-1]"]]
+
+
+@dataclass(frozen=True)
+class Twice(Formulation):
+    """The same matrix in two places, once turned round; a variable of two words."""
+
+    name: ClassVar[str] = "twice"
+
+    def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
+        """State it."""
+        qd, share = qp.variable("qd", tick.nv), qp.variable("free share", 1)
+        b = tick.parameter("b", 1.0, size=2)
+        qp.between(0.0, b * qd[:2] + share, 1.0, name="one")
+        qp.between(-1.0, -b * qd[:2], 0.0, name="other")
+        qp.command(qd)
+
+
+def test_the_same_matrix_has_the_same_letter() -> None:
+    text = Twice().describe(ROBOT, "position")
+    assert math(text)[1:-2] == [
+        r"\min_{\dot q,\,\text{free share}}\quad & 0",
+        r"\text{s.t.}\quad & 0 \le A_{1} \dot q + A_{2} \text{free share} \le 1 && \text{one}",
+        r"& -1 \le -A_{1} \dot q \le 0 && \text{other}",
+    ]
+    assert "| $A_{1}$ | one, factor of qd; -other, factor of qd | 2 x 7 | change every tick |" in text
 
 
 @pytest.mark.parametrize("mode", MODES)

@@ -47,6 +47,7 @@ def test_it_is_dpp_and_names_everything(formulation: str, mode: str) -> None:
     assert list(made.variables) == list(program.variables)
     assert list(made.constraints) == [rows.name for rows in program.rows]
     assert all(name.isidentifier() for name in made.parameters)
+    assert all(variable.name().isidentifier() for variable in made.variables.values())
     assert {p.name() for p in made.problem.parameters()} <= set(made.parameters)
     for name, constraints in made.constraints.items():
         assert {constraint.label for constraint in constraints} == {name}
