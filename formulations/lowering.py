@@ -137,9 +137,10 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode) -> Lowered:
 
     dense = {name: ca.densify(ca.simplify(data[name])) for name in DATA}
     symbols = [given.symbol for given in tick.inputs]
-    function = ca.Function(
-        "lowered", symbols, [dense[name] for name in DATA], [given.name for given in tick.inputs], list(DATA)
-    )
+    # A run-time parameter may well be called b, as a right-hand side is here.
+    both = {"allow_duplicate_io_names": True}
+    names_in, outputs = [given.name for given in tick.inputs], [dense[name] for name in DATA]
+    function = ca.Function("lowered", symbols, outputs, names_in, list(DATA), both)
     ends = np.cumsum([variable.size1() for variable in qp.variables.values()])
     variables = {
         name: slice(int(end) - variable.size1(), int(end))
