@@ -22,8 +22,8 @@ from ..benchmarks import (
     sweep,
     sweep_table,
 )
-from ..codegen import ExportError, export_c
-from ..formulations import MODE_NAMES, ModeError, available_formulations, get_formulation
+from ..codegen import CurvatureError, ExportError, export_c
+from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
@@ -34,9 +34,12 @@ from .interrupt import interruptible
 USER_ERRORS = (
     CompilerError,
     ConfigError,
+    CurvatureError,
+    DeclarationError,
     ExportError,
     ModeError,
     OptionError,
+    PlotError,
     PluginError,
     RobotError,
     StoreError,
@@ -60,7 +63,7 @@ def list_all() -> None:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(no_wrap=True)
     table.add_column()
-    described = {name: (type(get_formulation(name)).__doc__ or "").splitlines()[0] for name in available_formulations()}
+    described = {name: _described(name) for name in available_formulations()}
     rows: dict[str, dict[str, str]] = {
         "robots": dict.fromkeys(available_robots(), ""),
         "modes": dict.fromkeys(MODE_NAMES, ""),
@@ -130,6 +133,31 @@ def run_export(
     console.print(f"Next: cmake -S {folder} -B {build} && cmake --build {build} && ctest --test-dir {build}")
 
 
+@app.command("describe")
+def run_describe(
+    robot: Annotated[str, typer.Option(help="Registered name, or a URDF file.")],
+    formulation: Annotated[str, typer.Option(help="Registered name, or module:Name.")],
+    mode: Annotated[str, typer.Option(help="Motion mode, e.g. fix-orientation or line:z.")],
+    spy: Annotated[Path | None, typer.Option(help="Draw the KKT matrix's pattern to this .png or .svg.")] = None,
+    tip: Annotated[str | None, typer.Option(help="Frame at the tool centre point, where the URDF branches.")] = None,
+) -> None:
+    """Print the problem as Markdown with LaTeX: dimensions, named rows, run-time inputs."""
+    arm, made = load_robot(robot, tip=tip), get_formulation(formulation)
+    # Not through Rich: Markdown in a file must not be wrapped.
+    typer.echo(made.describe(arm, mode), nl=False)
+    if spy is not None:
+        written = made.spy(arm, mode, spy)
+        Console(stderr=True, soft_wrap=True).print(f"Wrote {written}. Next: kinqp export, to have it as C.")
+
+
+def _described(formulation: str) -> str:
+    """First line of a formulation's docstring; what is wrong with it, where another package's can't be loaded."""
+    try:
+        return (type(get_formulation(formulation)).__doc__ or "").partition("\n")[0]
+    except PluginError as error:
+        return str(error)
+
+
 def _console() -> Console:
     # A narrower terminal, or none, would cut figures off; wrapped lines can still be read.
     return Console(width=max(TABLE_WIDTH, Console().width))
@@ -137,6 +165,8 @@ def _console() -> Console:
 
 def main() -> None:
     """Run the command; what a user got wrong ends in one sentence and exit code 2, not in a traceback."""
+    # A module beside one's work is found as `module:Name`, as with python -m; last, so that it hides nothing.
+    sys.path.append(str(Path.cwd()))
     try:
         app()
     except USER_ERRORS as error:

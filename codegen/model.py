@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from ..formulations import lower
+from .definite import require_definite
 from .emit import emit, needed_for, number
 from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
@@ -304,7 +305,9 @@ def _identical(a: ca.SX, b: ca.SX) -> bool:
 def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lowered, Reduced]:
     """Lower with cuts, unless the declaration looks through one: a derivative doesn't see what lies behind a symbol."""
     plain, cut = lower(formulation, robot, mode), lower(formulation, robot, mode, cut=True)
-    return (cut, reduce(cut)) if agree(plain, cut) else (plain, reduce(plain))
+    reduced = reduce(plain)
+    require_definite(plain, reduced)
+    return (cut, reduce(cut)) if agree(plain, cut) else (plain, reduced)
 
 
 def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.SX]:

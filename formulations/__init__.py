@@ -13,6 +13,7 @@ from .modes import MODE_NAMES, Mode, ModeError
 from .program import DeclarationError, QuadraticProgram
 from .registry import available_formulations, get_formulation
 from .result import StepResult
+from .spy import PlotError
 from .tick import DEFAULT_DT, Input, Tick
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "Lowered",
     "Mode",
     "ModeError",
+    "PlotError",
     "QuadraticProgram",
     "RowNames",
     "StepResult",

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ..solvers import QP
-from .inputs import InputError, check_input, describe_input
+from .inputs import complete_inputs
 from .lowering import DATA, Lowered
 
 if TYPE_CHECKING:
@@ -92,9 +92,6 @@ class Evaluator:
         self._results: Final = {name: np.zeros(value.shape) for name, value in outputs.items()}
         for index, matrix in enumerate(self._results.values()):
             self._buffer.set_res(index, memoryview(matrix.reshape(-1)))  # type: ignore[arg-type,call-arg]  # as above
-        self._defaults: Final = {given.name: given.default for given in self.inputs if given.default is not None}
-        self._specs: Final = {given.name: given for given in self.inputs}
-        self._required: Final = [given.name for given in self.inputs if given.default is None]
 
     def __call__(self, **inputs: ArrayLike) -> Instance:
         """Evaluate at a state.
@@ -124,21 +121,8 @@ class Evaluator:
         )  # fmt: skip
 
     def _fill(self, inputs: Mapping[str, ArrayLike]) -> None:
-        for name in inputs:
-            if name not in self._specs:
-                raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
-        for name in self._required:
-            if name not in inputs:
-                wanted = describe_input(self._specs[name], self.lowered.mode)
-                raise InputError(f"{name}: expected {wanted}, got nothing")
-        for name, values in self._given.items():
-            if name in inputs:
-                values[:] = check_input(self._specs[name], inputs[name], self.lowered.mode)
-            else:
-                values[:] = self._defaults[name]
-        if (self._given["q_min"] > self._given["q_max"]).any():
-            low, high = self._given["q_min"], self._given["q_max"]
-            raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
+        for name, value in complete_inputs(self.inputs, inputs, self.lowered.mode).items():
+            self._given[name][:] = value
 
     def active_rows(self, qp: QP, solution: Solution) -> tuple[str, ...]:
         """Names of the rows that hold the solution back, each with its side, as in "joint limits[3] upper"."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import ArrayLike, NDArray
 
     from .modes import Mode
@@ -46,3 +48,29 @@ def describe_input(spec: Input, mode: Mode) -> str:
     if spec.name == "v":
         return f"shape ({spec.size},) for mode {mode} (rows {', '.join(mode.free_names)})"
     return f"shape ({spec.size},) [{spec.unit}]"
+
+
+def complete_inputs(specs: Sequence[Input], given: Mapping[str, ArrayLike], mode: Mode) -> dict[str, Array]:
+    """Check what was given of a step's inputs and add the defaults of the rest; by name, shapes (size,).
+
+    Raises
+    ------
+    InputError
+        Naming an input that is unknown, missing, of the wrong size, not finite or out of its range.
+    """
+    known = {spec.name: spec for spec in specs}
+    for name in given:
+        if name not in known:
+            raise InputError(f"{name}: expected an input among {', '.join(known)}, got {name!r}")
+    values: dict[str, Array] = {}
+    for name, spec in known.items():
+        if name in given:
+            values[name] = np.broadcast_to(check_input(spec, given[name], mode), (spec.size,))
+        elif spec.default is not None:
+            values[name] = spec.default
+        else:
+            raise InputError(f"{name}: expected {describe_input(spec, mode)}, got nothing")
+    if {"q_min", "q_max"} <= values.keys() and (values["q_min"] > values["q_max"]).any():
+        low, high = values["q_min"], values["q_max"]
+        raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
+    return values

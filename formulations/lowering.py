@@ -66,6 +66,8 @@ class Lowered:
     rows : RowNames
     constant : dict of str to ndarray of bool
         For each of `DATA`, which entries do not depend on the inputs.
+    program : QuadraticProgram
+        The declaration itself, term by term, in the symbols of `tick`.
     """
 
     formulation: Formulation
@@ -77,6 +79,7 @@ class Lowered:
     variables: dict[str, slice]
     rows: RowNames
     constant: dict[str, NDArray[np.bool_]]
+    program: QuadraticProgram
 
     @property
     def symbols(self) -> tuple[ca.SX, ...]:
@@ -129,6 +132,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
         weighted = ca.repmat(term.weight, 1, n) * slope
         data["H"] += slope.T @ weighted
         data["g"] += weighted.T @ offset
+    for cost in qp.costs:
+        data["g"] += _affine(cost.expression, x, f"{formulation.name}, {cost.name}")[0].T
     data["K"], data["k"] = _affine(qp.command_expression, x, f"{formulation.name}, command")
     if data["k"].size1() != robot.nv:
         raise DeclarationError(
@@ -147,6 +152,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
         [dense[name] for name in DATA],
         [*(given.name for given in tick.inputs), *(f"cut{k}" for k in range(len(cuts)))],
         list(DATA),
+        # A run-time parameter may well be called b, as a right-hand side is here.
+        {"allow_duplicate_io_names": True},
     )
     ends = np.cumsum([variable.size1() for variable in qp.variables.values()])
     variables = {
@@ -154,7 +161,7 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
         for end, (name, variable) in zip(ends, qp.variables.items(), strict=True)
     }
     constant = {name: _constant_entries(dense[name]) for name in DATA}
-    return Lowered(formulation, robot, mode, tick, tick.inputs, function, variables, names, constant)
+    return Lowered(formulation, robot, mode, tick, tick.inputs, function, variables, names, constant, qp)
 
 
 def _affine(expression: ca.SX, x: ca.SX, label: str) -> tuple[ca.SX, ca.SX]:

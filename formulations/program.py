@@ -25,6 +25,14 @@ class Term:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """One linear objective term, a scalar affine in the variables."""
+
+    name: str
+    expression: ca.SX
+
+
+@dataclass(frozen=True)
 class Rows:
     """Named rows lower <= expression <= upper; equalities have `upper` is None and mean expression = lower."""
 
@@ -44,6 +52,7 @@ class QuadraticProgram:
     def __init__(self) -> None:
         self.variables: Final[dict[str, ca.SX]] = {}
         self.terms: Final[list[Term]] = []
+        self.costs: Final[list[Cost]] = []
         self.rows: Final[list[Rows]] = []
         self.command_expression: ca.SX | None = None
         self.feasible_values: Final[dict[str, ca.SX]] = {}
@@ -84,6 +93,20 @@ class QuadraticProgram:
         if w.is_constant() and not np.all(np.asarray(ca.DM(w)) >= 0.0):
             raise DeclarationError(f"{label}: expected weights that are not negative, got {w}")
         self.terms.append(Term(label, r, ca.repmat(w, r.size1(), 1) if w.shape == (1, 1) else w))
+
+    def minimize_linear(self, cost: Operand, name: str | None = None) -> None:
+        """Add a scalar to the objective that is affine in the variables, such as the bound of a largest entry.
+
+        Parameters
+        ----------
+        cost : ca.SX, scalar
+        name : str, optional
+            For messages; "cost 1", "cost 2", ... unless given.
+        """
+        label, expression = name or f"cost {len(self.costs) + 1}", ca.SX(cost)
+        if expression.shape != (1, 1):
+            raise DeclarationError(f"{label}: expected a scalar as linear cost, got shape {expression.shape}")
+        self.costs.append(Cost(label, expression))
 
     def equal(self, left: Operand, right: Operand, name: str) -> None:
         """Add equality rows left = right, affine in the variables; no rows at all are accepted and left out."""
