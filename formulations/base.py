@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from .bounds import BOUNDS
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
     from .tick import Tick
+
+SafeStop = Literal["zero", "braking"]
 
 
 @dataclass(frozen=True)
@@ -24,11 +26,18 @@ class Formulation(ABC):
     ----------
     bounds : {"viable", "thesis"}
         How joint velocity bounds follow from the limits; see `kinqp.formulations.velocity_bounds`.
+
+    Notes
+    -----
+    `safe_stop` says what is sent where a tick is not solved: zero velocity at once, or, for a formulation that keeps to
+    acceleration limits, the fastest admissible braking from the last command (`kinqp.formulations.braking`). The
+    latter makes `qd_prev` an input of every step.
     """
 
     bounds: str = "viable"
 
     name: ClassVar[str]
+    safe_stop: ClassVar[SafeStop] = "zero"
 
     def __post_init__(self) -> None:
         if self.bounds not in BOUNDS:

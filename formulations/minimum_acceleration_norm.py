@@ -1,0 +1,72 @@
+"""`minimum-acceleration-norm`: the smallest joint accelerations that do the task, which slows down where limits demand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Final
+
+from .acceleration_task import HandAcceleration, ScaledTask, YieldingLimits
+from .base import Formulation, SafeStop
+
+if TYPE_CHECKING:
+    from .program import QuadraticProgram
+    from .tick import Tick
+
+# Against a task of cost 1: at 10 rad/s^2 in all of seven joints the accelerations cost 0.0035.
+ACCELERATION_WEIGHT: Final = 1e-5
+
+
+@dataclass(frozen=True)
+class MinimumAccelerationNorm(Formulation):
+    r"""MAN (thesis 3.1.5; Zhang and Ma 2007), with the task as a hard equality on a scaled velocity.
+
+    .. math::
+        \min_{\ddot q, \sigma, s}\ \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev})
+        + \tfrac12 w_\sigma (2 - \sigma)^2 + \tfrac12 w_s (1 + s)^2
+        \quad\text{s.t.}\quad J_{free}\,\dot q = \sigma\,v_{next},\quad J_{fixed}\,\dot q = v_{fixed},\quad
+        \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
+        \ddot q_{lo} - s\,\ddot q_{max} \le \ddot q \le \ddot q_{hi} + s\,\ddot q_{max},\quad
+        0 \le \sigma \le 1,\quad s \ge 0
+
+    with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. How sigma scales: `ScaledTask`. What yields to what:
+    `YieldingLimits`; the task is slowed down before acceleration limits are exceeded.
+
+    MAN proper has k = 0. It then never takes self-motion out of the arm once it is there: O'Neil (2002) shows
+    that joint velocities may grow without bound while the tool moves on calmly; here the limits end that. `joint_damping` k makes
+    self-motion die away with the time constant 1/k.
+
+    Parameters
+    ----------
+    torque_limits : bool
+        Keep M qdd + h within +-tau_max, where known.
+
+    Run-time parameters
+    -------------------
+    acceleration_weight : shape (nv,)
+        Diagonal of the weight on accelerations [s^4/rad^2 or s^4/m^2].
+    joint_damping
+        k [1/s].
+    time_constant
+        See `HandAcceleration` [s].
+    scale_penalty, stretch_penalty, torque_stretch_penalty
+        w of sigma and of the two stretches.
+    """
+
+    torque_limits: bool = False
+
+    name: ClassVar[str] = "minimum-acceleration-norm"
+    safe_stop: ClassVar[SafeStop] = "braking"
+
+    def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
+        """State the problem of one control cycle."""
+        ahead = qp.variable("qd_ahead", tick.nv)
+        hand = HandAcceleration.of(tick)
+        qdd = hand.acceleration(ahead)
+        weight = tick.parameter("acceleration_weight", ACCELERATION_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
+        damping = tick.parameter("joint_damping", 0.0, lowest=0.0, unit="1/s")
+        qp.minimize(qdd + damping * tick.qd_prev, weight=weight, name="acceleration norm")
+        ScaledTask.declare(qp, tick, hand, ahead)
+        limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
+        qp.command(hand.command(ahead))
+        rest = hand.ahead(tick.qd_fixed)
+        qp.feasible(qd_ahead=rest, scale=0, **limits.feasible(rest))
