@@ -13,7 +13,7 @@ from .emit import emit, number
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..formulations import Formulation, Input, Lowered, Mode
     from ..robots import Robot
@@ -35,6 +35,14 @@ _COMMENTS: Final = {
     "joint_weight": "weights of the joint velocities",
     "damping_threshold": "smallest singular value below which damping sets in",
     "damping_max": "damping at the singularity",
+    "time_constant": "lag of the tool behind the hand; at least one period",
+    "stretch_penalty": "weight of exceeding acceleration limits",
+    "torque_stretch_penalty": "weight of exceeding torque limits",
+    "brake_penalty": "weight of braking self-motion",
+    "scale_penalty": "weight of slowing the task down",
+    "acceleration_weight": "weights of the joint accelerations",
+    "torque_weight": "weights of the joint torques",
+    "joint_damping": "rate at which self-motion dies away",
 }
 
 
@@ -103,6 +111,8 @@ class StepCode:
     parameters, inputs : tuple of Field
         Of the two structs; the largest size over the modes.
     modes : tuple of ModeCode
+    brake_body : tuple of str
+        Statements of the safe stop by braking; empty where the safe stop is zero velocity.
     """
 
     prefix: str
@@ -116,6 +126,7 @@ class StepCode:
     parameters: tuple[Field, ...]
     inputs: tuple[Field, ...]
     modes: tuple[ModeCode, ...]
+    brake_body: tuple[str, ...]
 
     @property
     def sizes(self) -> tuple[tuple[int, int], ...]:
@@ -128,7 +139,8 @@ class StepCode:
 
 def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], prefix: str) -> StepCode:
     """Work out the code of a formulation on a robot in one or more modes."""
-    codes = tuple(_mode_code(lower(formulation, robot, mode)) for mode in modes)
+    lowered = tuple(lower(formulation, robot, mode) for mode in modes)
+    codes = tuple(_mode_code(each) for each in lowered)
     largest: dict[str, Input] = {}
     for code in codes:
         # A mode without locked rows has nothing to say of their velocity, and C99 has no arrays of size zero.
@@ -147,6 +159,7 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
         parameters=tuple(_field(given) for name, given in largest.items() if name not in _SIGNALS),
         inputs=tuple(_field(given) for name, given in largest.items() if name in _SIGNALS),
         modes=codes,
+        brake_body=_brake_body(lowered[0]) if formulation.safe_stop == "braking" else (),
     )
 
 
@@ -174,11 +187,7 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         [ca.densify(value) for value in ca.cse([ca.SX(value) for value in outputs.values()])],
     )
     fields = {given.name: _field(given) for given in inputs}
-    # A parameter that is a plain number is read through its address, as an array of one.
-    sources = [
-        f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
-        for name, field in fields.items()
-    ]
+    sources = _sources(fields)
     mode = lowered.mode
     tick = lowered.tick
     angles = {f"in->q[{i}]": f"[{i}]" for i in range(tick.nv)}
@@ -204,6 +213,20 @@ def _mode_code(lowered: Lowered) -> ModeCode:
         rows=reduced.rows,
         inputs=inputs,
     )
+
+
+def _sources(fields: Mapping[str, Field]) -> list[str]:
+    # A parameter that is a plain number is read through its address, as an array of one.
+    return [
+        f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
+        for name, field in fields.items()
+    ]
+
+
+def _brake_body(lowered: Lowered) -> tuple[str, ...]:
+    brake = ca.densify(lowered.tick.qd_brake)
+    function = ca.Function("brake", [given.symbol for given in lowered.inputs], [brake])
+    return tuple(emit(function, _sources({given.name: _field(given) for given in lowered.inputs}), ["qd"]))
 
 
 def _outputs(lowered: Lowered, reduced: Reduced, *, gradient: bool, diagonal: bool) -> dict[str, ca.SX]:

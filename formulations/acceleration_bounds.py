@@ -2,10 +2,10 @@
 
 The command of an acceleration-level formulation is the velocity that its acceleration leads to within one period,
 qd = qd_prev + dt qdd, held for that period: q + dt qd is where the joint is next (semi-implicit Euler). That is the
-sampled model that the `viable` velocity bounds are exact for, so that the set of states from which a joint can still stop
-before its limit with at most `qdd_max` is known in closed form: every velocity within the velocity bounds. What A. Del
-Prete (IEEE Robotics and Automation Letters 3(1), 2018) works out for joints whose acceleration is held over a period, a
-viable set and the interval of accelerations that stays in it, is here one intersection per joint.
+sampled model for which the `viable` velocity bounds are exact: the states from which a joint can stop before its limit
+with at most `qdd_max` are those within the velocity bounds. What A. Del Prete (IEEE Robotics and Automation Letters
+3(1), 2018) works out for joints whose acceleration is held over a period, a viable set and the interval of
+accelerations that stays in it, is here one intersection per joint.
 """
 
 from __future__ import annotations

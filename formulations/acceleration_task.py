@@ -1,8 +1,8 @@
 """What the acceleration-level formulations share: the hand's velocity as an acceleration, and limits that can yield.
 
 Accelerations are stated by where they lead: `ahead` is qd_prev + T qdd, the joint velocity after the time constant T at
-constant acceleration. In these units (T is 10 ms) the numbers of the QP are of order one. With qdd itself as variable its Hessian is
-T^2 = 1e-4 times smaller beside the same penalties, and interior-point solvers lose up to four digits.
+constant acceleration. In these units (T is 10 ms) the numbers of the QP are of order one. With qdd itself as variable
+the Hessian is T^2 = 1e-4 times smaller beside the same penalties, and interior-point solvers lose up to four digits.
 """
 
 from __future__ import annotations
@@ -25,17 +25,22 @@ DEFAULT_TIME_CONSTANT: Final = 0.01
 # docs/acceleration-level.md for how they were chosen.
 STRETCH_PENALTY: Final = 10.0
 TORQUE_STRETCH_PENALTY: Final = 100.0
+# Of leaving the hand's direction, in the formulations that keep to it: 1 cm/s costs a twentieth of standing still.
+DIRECTION_WEIGHT: Final = 1e3
 
 
 @dataclass(frozen=True)
 class HandAcceleration:
     r"""The hand's velocity as a request for acceleration.
 
-    The tool follows the hand with a lag of first order, :math:`\dot x' = (v - \dot x)/T`, from the tool's velocity in the
-    tick before, :math:`\dot x = J_{free}\,\dot q_{prev} - dt\,\dot J_{free}\,\dot q_{prev}` (the Jacobian being that of
-    the present position): :math:`J_{free}\,\ddot q + \dot J_{free}\,\dot q_{prev} = (v + \varepsilon - \dot x)/T`. Sampled,
-    the curvature cancels: without error the tool moves at :math:`\dot x + (dt/T)(v - \dot x)` next, and there is no
-    lag that stays. T = dt asks for v within one period, as the velocity level does.
+    The tool follows the hand with a lag of first order, T, from the tool's velocity in the tick before,
+    :math:`\dot x = J_{free}\,\dot q_{prev} - dt\,\dot J_{free}\,\dot q_{prev}` (the Jacobian being that of the present
+    position):
+
+    .. math:: J_{free}\,\ddot q + \dot J_{free}\,\dot q_{prev} = (v + \varepsilon - \dot x)/T
+
+    Sampled, the curvature cancels: without error the tool moves at :math:`\dot x + (dt/T)(v - \dot x)` next, and no
+    error stays. T = dt asks for v within one period, as the velocity level does.
 
     Attributes
     ----------
@@ -82,11 +87,12 @@ class HandAcceleration:
 class YieldingLimits:
     """Limits on the acceleration of a formulation, and what gives way where they leave nothing.
 
-    In this order: the locked rows hold exactly; position and velocity limits ("joint limits") hold; torque limits, if asked
-    for, stretch by one common factor 1 + `torque stretch` only if nothing else is possible; acceleration limits by one
-    common factor 1 + `stretch`; then comes the task. Both stretches carry the cost 1/2 w (1 + s)^2 with s >= 0. Its slope at
-    zero, w, makes it an exact penalty: unlike with 1/2 w s^2 the answer has s = 0 wherever that is possible, as long as the
-    task gains less than w from a unit of s.
+    In this order: the locked rows hold exactly; position and velocity limits ("joint limits") hold; torque limits, if
+    asked for, stretch by one common factor 1 + `torque_stretch` only if nothing else is possible; acceleration limits
+    by one common factor 1 + `stretch`; then comes the task. Both stretches carry the cost 1/2 w (1 + s)^2 with s >= 0.
+    Its slope at zero, w, makes it an exact penalty: unlike with 1/2 w s^2 the answer has s = 0 wherever that is
+    possible, as long as the task gains less than w from a unit of s. Between the two stretches the order is one of
+    weights, ten to one.
 
     Attributes
     ----------
@@ -104,7 +110,7 @@ class YieldingLimits:
     def declare(
         cls, qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX, *, torques: bool
     ) -> YieldingLimits:
-        """Add limits on `ahead`, affine in the variables, shape (nv, 1) [rad/s or m/s], and the parameters of their penalties."""
+        """Add limits on `ahead`, affine in the variables, (nv, 1) [rad/s or m/s], and the parameters of the penalties."""
         stretch = qp.variable("stretch", 1)
         penalty = tick.parameter("stretch_penalty", STRETCH_PENALTY, lowest=0.0, positive=True)
         qp.minimize(1 + stretch, weight=penalty, name="acceleration limits")
@@ -137,32 +143,37 @@ class YieldingLimits:
 
 @dataclass(frozen=True)
 class ScaledTask:
-    r"""The task as a hard equality that keeps the hand's direction, and slows down where limits demand.
+    r"""The task in the hand's direction, slowed down where limits demand.
 
-    :math:`J_{free}\,\dot q = \sigma\,v_{next}` with :math:`v_{next} = \dot x + (dt/T)(v - \dot x)`, the velocity that
-    `HandAcceleration` gives the tool next. sigma = 1 is that request,
-    :math:`J_{free}\,\ddot q + \dot J_{free}\,\dot q_{prev} = (v - \dot x)/T`; sigma < 1 shortens the tool's next velocity, not
-    its change: with the change scaled, the tool could not be stopped at a limit. sigma = 0 is standing still, which all rows
-    admit while `v_fixed` is zero. Its cost 1/2 w (2 - sigma)^2 is an exact penalty like those of the stretches: sigma = 1
-    wherever that is possible at a cost of less than w.
+    :math:`J_{free}\,\dot q = \sigma\,v_{next} + (dt/T)\,\varepsilon` with
+    :math:`v_{next} = \dot x + (dt/T)(v - \dot x)`, the velocity that `HandAcceleration` gives the tool next. sigma = 1
+    is that request, :math:`J_{free}\,\ddot q + \dot J_{free}\,\dot q_{prev} = (v - \dot x)/T`; sigma < 1 shortens the
+    tool's next velocity and not its change: with the change scaled, the tool could not be stopped at a limit. sigma = 0
+    is standing still, which all rows admit while `v_fixed` is zero.
 
-    What the scale can't do: slide along a limit, or move where the arm is singular and v has the slightest part in
-    the lost direction. There the arm stands still until the hand pulls another way.
+    The cost of slowing down, 1/2 w (2 - sigma)^2, is an exact penalty like those of the stretches: sigma = 1 wherever
+    that is possible at a cost of less than w. eps, with a large weight, makes the equality a task and not a
+    constraint: the direction is left by what the acceleration limits take (a tool that grazes a limit at speed can't be
+    stopped in its direction in time), and where the arm is singular.
+
+    What the scale can't do is slide along a limit: the arm stops there until the hand pulls another way.
     """
 
     @staticmethod
     def declare(qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX) -> None:
-        """Add the scale, the rows of task and mode for `ahead`, (nv, 1), and the parameter `scale_penalty`."""
+        """Add scale and error, the rows of task and mode for `ahead`, (nv, 1), and the parameters of their costs."""
+        eps = qp.variable("eps", tick.m_free)
+        weight = tick.parameter("task_weight", DIRECTION_WEIGHT, size=tick.m_free, lowest=0.0, positive=True)
+        qp.minimize(eps, weight=weight, name="task direction")
         scale = qp.variable("scale", 1)
-        qp.minimize(
-            2 - scale, weight=tick.parameter("scale_penalty", 1.0, lowest=0.0, positive=True), name="task scale"
-        )
+        penalty = tick.parameter("scale_penalty", 1.0, lowest=0.0, positive=True)
+        qp.minimize(2 - scale, weight=penalty, name="task scale")
         qp.between(0, scale, 1, name="task scale")
         moving = matmul(tick.J_free, tick.qd_prev)
         x = moving - tick.dt * hand.Jdot_qd
         ratio = hand.T / tick.dt
         v_next = x + (tick.v - x) / ratio
-        qp.equal(tick.J_free @ ahead - (ratio * v_next) * scale, (1 - ratio) * moving, name="task")
+        qp.equal(tick.J_free @ ahead - (ratio * v_next) * scale - eps, (1 - ratio) * moving, name="task")
         lock(qp, tick, hand, ahead)
 
 
@@ -176,5 +187,5 @@ def lock(qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX)
 
 
 def torque(tick: Tick, qdd: ca.SX) -> ca.SX:
-    """Joint torques of an acceleration at the present position and the last velocity, M qdd + h, shape (nv, 1) [Nm or N]."""
+    """Joint torques M qdd + h at the present position and the last velocity, shape (nv, 1) [Nm or N]."""
     return tick.M @ qdd + tick.h

@@ -1,4 +1,4 @@
-"""`joint-space-acceleration`: joint accelerations as variables, the mode as an equality on the velocities they lead to."""
+"""`joint-space-acceleration`: joint accelerations as variables, the mode as an equality on where they lead."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ class JointSpaceAcceleration(Formulation):
         J_{fixed}\,\dot q = v_{fixed},\quad \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \ddot q_{lo} - s\,\ddot q_{max} \le \ddot q \le \ddot q_{hi} + s\,\ddot q_{max},\quad s \ge 0
 
-    with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. For the tool's last velocity and T see `HandAcceleration`, for s
-    `YieldingLimits`. Both costs look ahead by T: at constant acceleration :math:`\dot q_{prev} + T\ddot q` is the joint
-    velocity then, and eps the Cartesian error. The joint velocities follow those of `joint-space` with the lag T, so
-    that self-motion dies away too; with T = dt and wide acceleration limits the command is that of `joint-space`.
+    with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. For the tool's last velocity and T see
+    `HandAcceleration`, for s `YieldingLimits`. Both costs look ahead by T: at constant acceleration
+    :math:`\dot q_{prev} + T\ddot q`, the variable that is solved for, is the joint velocity then, and eps the Cartesian
+    error. The joint velocities follow those of `joint-space` with the lag T, so that self-motion dies away too; with
+    T = dt and wide acceleration limits the command is that of `joint-space`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""`minimum-acceleration-norm`: the smallest joint accelerations that do the task, which slows down where limits demand."""
+"""`minimum-acceleration-norm`: the smallest joint accelerations for the task, slowed down where limits demand."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ ACCELERATION_WEIGHT: Final = 1e-5
 
 @dataclass(frozen=True)
 class MinimumAccelerationNorm(Formulation):
-    r"""MAN (thesis 3.1.5; Zhang and Ma 2007), with the task as a hard equality on a scaled velocity.
+    r"""MAN (thesis 3.1.5; Zhang and Ma 2007), in a form that is always feasible.
 
     .. math::
-        \min_{\ddot q, \sigma, s}\ \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev})
-        + \tfrac12 w_\sigma (2 - \sigma)^2 + \tfrac12 w_s (1 + s)^2
-        \quad\text{s.t.}\quad J_{free}\,\dot q = \sigma\,v_{next},\quad J_{fixed}\,\dot q = v_{fixed},\quad
-        \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
+        \min_{\ddot q, \varepsilon, \sigma, s}\
+        \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev})
+        + \tfrac12\,\varepsilon' W \varepsilon + \tfrac12 w_\sigma (2 - \sigma)^2 + \tfrac12 w_s (1 + s)^2
+        \quad\text{s.t.}\quad J_{free}\,\dot q = \sigma\,v_{next} + (dt/T)\,\varepsilon,\quad
+        J_{fixed}\,\dot q = v_{fixed},\quad \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \ddot q_{lo} - s\,\ddot q_{max} \le \ddot q \le \ddot q_{hi} + s\,\ddot q_{max},\quad
         0 \le \sigma \le 1,\quad s \ge 0
 
-    with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. How sigma scales: `ScaledTask`. What yields to what:
-    `YieldingLimits`; the task is slowed down before acceleration limits are exceeded.
+    with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. How the task is scaled: `ScaledTask`. What yields to
+    what: `YieldingLimits`; the task gives way before acceleration limits are exceeded.
 
-    MAN proper has k = 0. It then never takes self-motion out of the arm once it is there: O'Neil (2002) shows
-    that joint velocities may grow without bound while the tool moves on calmly; here the limits end that. `joint_damping` k makes
-    self-motion die away with the time constant 1/k.
+    MAN proper has k = 0. It then never takes self-motion out of the arm once it is there: O'Neil (2002) shows that
+    joint velocities may grow without bound while the tool moves on calmly; here the limits end that. `joint_damping` k
+    makes self-motion die away with the time constant 1/k.
 
     Parameters
     ----------
@@ -46,6 +47,8 @@ class MinimumAccelerationNorm(Formulation):
         Diagonal of the weight on accelerations [s^4/rad^2 or s^4/m^2].
     joint_damping
         k [1/s].
+    task_weight : shape (m_free,)
+        W's diagonal; large, see `ScaledTask`.
     time_constant
         See `HandAcceleration` [s].
     scale_penalty, stretch_penalty, torque_stretch_penalty
@@ -69,4 +72,5 @@ class MinimumAccelerationNorm(Formulation):
         limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
         qp.command(hand.command(ahead))
         rest = hand.ahead(tick.qd_fixed)
-        qp.feasible(qd_ahead=rest, scale=0, **limits.feasible(rest))
+        left = (hand.T / tick.dt) * (tick.J_free @ tick.qd_fixed)
+        qp.feasible(qd_ahead=rest, eps=left, scale=0, **limits.feasible(rest))

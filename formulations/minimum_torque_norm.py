@@ -1,4 +1,4 @@
-"""`minimum-torque-norm`: the smallest joint torques that do the task, which slows down where limits demand."""
+"""`minimum-torque-norm`: the smallest joint torques for the task, slowed down where limits demand."""
 
 from __future__ import annotations
 
@@ -21,18 +21,20 @@ REGULARISATION: Final = 1e-7
 
 @dataclass(frozen=True)
 class MinimumTorqueNorm(Formulation):
-    r"""MTN (thesis 3.1.5; Hollerbach and Suh 1987), with the task as a hard equality on a scaled velocity.
+    r"""MTN (thesis 3.1.5; Hollerbach and Suh 1987), in a form that is always feasible.
 
     .. math::
-        \min_{\ddot q, \sigma, s}\ \tfrac12\,\tau' W_\tau \tau
-        + \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev}) + \ldots,\qquad \tau = M \ddot q + h
+        \min\ \tfrac12\,\tau' W_\tau \tau
+        + \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev}) + \ldots,
+        \qquad \tau = M \ddot q + h
 
     with all else as in `minimum-acceleration-norm`. Torques are those of the present position and the last velocity,
     gravity included.
 
-    Torques are smallest for the moment only: self-motion is thrown about to lighten the load, and braking it later costs more
-    than was saved. Hollerbach and Suh found accelerations without bound; here the limits end that, and the arm ends up rattling between
-    them. `joint_damping` k (with a larger `acceleration_weight`) calms it.
+    Torques are smallest for the moment only: self-motion is thrown about to lighten the load, and braking it later
+    costs more than was saved. Hollerbach and Suh found whipping motions and joint velocities without bound; here the
+    limits end that, with joints at their velocity limits. `joint_damping` k, with a larger `acceleration_weight`, calms
+    it.
 
     Parameters
     ----------
@@ -45,7 +47,7 @@ class MinimumTorqueNorm(Formulation):
         W_tau's diagonal [1/(Nm)^2 or 1/N^2].
     acceleration_weight : shape (nv,)
         Diagonal of the small weight that keeps the problem strictly convex [s^4/rad^2 or s^4/m^2].
-    joint_damping, time_constant, scale_penalty, stretch_penalty, torque_stretch_penalty
+    task_weight, joint_damping, time_constant, scale_penalty, stretch_penalty, torque_stretch_penalty
         As in `minimum-acceleration-norm`.
 
     Raises
@@ -73,4 +75,5 @@ class MinimumTorqueNorm(Formulation):
         limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
         qp.command(hand.command(ahead))
         rest = hand.ahead(tick.qd_fixed)
-        qp.feasible(qd_ahead=rest, scale=0, **limits.feasible(rest))
+        left = (hand.T / tick.dt) * (tick.J_free @ tick.qd_fixed)
+        qp.feasible(qd_ahead=rest, eps=left, scale=0, **limits.feasible(rest))
