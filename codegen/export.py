@@ -43,7 +43,7 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class Recorded:
-    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free), and qd_prev (N, nv) where it is an input."""
+    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free); qd_prev (N, nv) where it is an input."""
 
     mode: NDArray[np.int64]
     q: Array

@@ -110,7 +110,7 @@ class YieldingLimits:
     def declare(
         cls, qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX, *, torques: bool
     ) -> YieldingLimits:
-        """Add limits on `ahead`, affine in the variables, (nv, 1) [rad/s or m/s], and the parameters of the penalties."""
+        """Add limits on `ahead`, affine in the variables, (nv, 1) [rad/s or m/s], and parameters of their penalties."""
         stretch = qp.variable("stretch", 1)
         penalty = tick.parameter("stretch_penalty", STRETCH_PENALTY, lowest=0.0, positive=True)
         qp.minimize(1 + stretch, weight=penalty, name="acceleration limits")
@@ -161,7 +161,7 @@ class ScaledTask:
 
     @staticmethod
     def declare(qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX) -> None:
-        """Add scale and error, the rows of task and mode for `ahead`, (nv, 1), and the parameters of their costs."""
+        """Add scale and error, the rows of the task for `ahead`, (nv, 1), and the parameters of their costs."""
         eps = qp.variable("eps", tick.m_free)
         weight = tick.parameter("task_weight", DIRECTION_WEIGHT, size=tick.m_free, lowest=0.0, positive=True)
         qp.minimize(eps, weight=weight, name="task direction")
@@ -174,16 +174,23 @@ class ScaledTask:
         ratio = hand.T / tick.dt
         v_next = x + (tick.v - x) / ratio
         qp.equal(tick.J_free @ ahead - (ratio * v_next) * scale - eps, (1 - ratio) * moving, name="task")
-        lock(qp, tick, hand, ahead)
 
 
-def lock(qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX) -> None:
-    """Add the rows of the mode: J_fixed qd = v_fixed for the velocity that is sent, stated for `ahead`, (nv, 1).
+def locked_motion(qp: QuadraticProgram, tick: Tick, hand: HandAcceleration) -> tuple[ca.SX, ca.SX]:
+    """Add the variable of the joint-space formulations, T/dt (qd - qd_fixed), and the rows of the mode for it.
 
-    Stated as J qdd + Jdot qd = 0 they would hold to first order in dt only, and drift.
+    J_fixed qd = v_fixed for the velocity that is sent is then J_fixed `motion` = 0, which has a solution whatever the
+    rank of J_fixed. Stated as J qdd + Jdot qd = 0 the rows would hold to first order in dt only, and drift.
+
+    Returns
+    -------
+    ahead, rest : ca.SX, shape (nv, 1)
+        Joint velocity T ahead: as an expression in the variable, and of the smallest admissible motion [rad/s or m/s].
     """
-    moving = matmul(tick.J_fixed, tick.qd_prev)
-    qp.equal(tick.J_fixed @ ahead, moving + (hand.T / tick.dt) * (tick.v_fixed - moving), name="mode")
+    motion = qp.variable("motion", tick.nv)
+    qp.equal(tick.J_fixed @ motion, 0, name="mode")
+    rest = hand.ahead(tick.qd_fixed)
+    return rest + motion, rest
 
 
 def torque(tick: Tick, qdd: ca.SX) -> ca.SX:

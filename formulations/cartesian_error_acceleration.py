@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
+import casadi as ca
+
 from .acceleration_task import HandAcceleration, YieldingLimits
-from .algebra import matmul
+from .algebra import dot, matmul
 from .base import Formulation, SafeStop
 
 if TYPE_CHECKING:
@@ -15,6 +17,9 @@ if TYPE_CHECKING:
 
 # Of braking self-motion: above what the task may gain, below that of the acceleration limits.
 BRAKE_PENALTY: Final = 1.0
+
+# Joint speed below which nothing moves [rad/s or m/s]; dropped at once that is an acceleration of 1e-5.
+SLOWEST: Final = 1e-8
 
 
 @dataclass(frozen=True)
@@ -38,9 +43,10 @@ class CartesianErrorAcceleration(Formulation):
         s \ge 0,\quad 0 \le \beta \le 1
 
     Self-motion is out of the task's reach, as in `cartesian-error`: what there is of it in the last command dies away
-    with T, or, where limits leave no time for that, as fast as `beta` must brake. eps = -w with beta = 1 is zero motion,
-    and feasible while `v_fixed` is zero. What yields to what: `YieldingLimits`; braking self-motion comes before
-    exceeding acceleration limits. With T = dt and wide acceleration limits the command is that of `cartesian-error`.
+    with T, or, where limits leave no time for that, as fast as `beta` must brake. eps = -w with beta = 1 is zero
+    motion, and feasible while `v_fixed` is zero. What yields to what: `YieldingLimits`; braking self-motion comes
+    before exceeding acceleration limits. With T = dt and wide acceleration limits the command is that of
+    `cartesian-error`.
 
     Parameters
     ----------
@@ -73,6 +79,8 @@ class CartesianErrorAcceleration(Formulation):
         qp.minimize(1 + brake, weight=brake_weight, name="brake")
         qp.between(0, brake, 1, name="brake")
         within = tick.qd_prev_free
+        # What is left of none is rounding; `brake` with nothing but that in its column makes rows almost dependent.
+        within = ca.if_else(dot(within, within) > SLOWEST**2, within, 0)
         across = tick.qd_prev - within
         ratio = hand.T / tick.dt
         # Where the part that moves the locked rows is going.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from .acceleration_task import HandAcceleration, YieldingLimits, lock
+from .acceleration_task import HandAcceleration, YieldingLimits, locked_motion
 from .base import Formulation, SafeStop
 from .joint_space import DEFAULT_JOINT_WEIGHT
 
@@ -27,9 +27,9 @@ class JointSpaceAcceleration(Formulation):
 
     with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. For the tool's last velocity and T see
     `HandAcceleration`, for s `YieldingLimits`. Both costs look ahead by T: at constant acceleration
-    :math:`\dot q_{prev} + T\ddot q`, the variable that is solved for, is the joint velocity then, and eps the Cartesian
-    error. The joint velocities follow those of `joint-space` with the lag T, so that self-motion dies away too; with
-    T = dt and wide acceleration limits the command is that of `joint-space`.
+    :math:`\dot q_{prev} + T\ddot q` is the joint velocity then, and eps the Cartesian error. The joint velocities follow
+    those of `joint-space` with the lag T, so that self-motion dies away too; with T = dt and wide acceleration limits
+    the command is that of `joint-space`.
 
     Parameters
     ----------
@@ -54,15 +54,13 @@ class JointSpaceAcceleration(Formulation):
     def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
         """State the problem of one control cycle."""
         eps = qp.variable("eps", tick.m_free)
-        ahead = qp.variable("qd_ahead", tick.nv)
         hand = HandAcceleration.of(tick)
+        ahead, rest = locked_motion(qp, tick, hand)
         task_weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
         joint_weight = tick.parameter("joint_weight", DEFAULT_JOINT_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
         qp.minimize(eps, weight=task_weight, name="Cartesian error")
         qp.minimize(ahead, weight=joint_weight, name="joint speed")
         qp.equal(tick.J_free @ ahead - eps, tick.v - hand.curvature, name="task")
-        lock(qp, tick, hand, ahead)
         limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
         qp.command(hand.command(ahead))
-        rest = hand.ahead(tick.qd_fixed)
-        qp.feasible(eps=tick.J_free @ rest - (tick.v - hand.curvature), qd_ahead=rest, **limits.feasible(rest))
+        qp.feasible(eps=tick.J_free @ rest - (tick.v - hand.curvature), motion=0, **limits.feasible(rest))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from .acceleration_task import HandAcceleration, ScaledTask, YieldingLimits, torque
+from .acceleration_task import HandAcceleration, ScaledTask, YieldingLimits, locked_motion, torque
 from .base import Formulation, SafeStop
 
 if TYPE_CHECKING:
@@ -63,8 +63,8 @@ class MinimumTorqueNorm(Formulation):
 
     def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
         """State the problem of one control cycle."""
-        ahead = qp.variable("qd_ahead", tick.nv)
         hand = HandAcceleration.of(tick)
+        ahead, rest = locked_motion(qp, tick, hand)
         qdd = hand.acceleration(ahead)
         torque_weight = tick.parameter("torque_weight", TORQUE_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
         weight = tick.parameter("acceleration_weight", REGULARISATION, size=tick.nv, lowest=0.0, positive=True)
@@ -74,6 +74,5 @@ class MinimumTorqueNorm(Formulation):
         ScaledTask.declare(qp, tick, hand, ahead)
         limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
         qp.command(hand.command(ahead))
-        rest = hand.ahead(tick.qd_fixed)
         left = (hand.T / tick.dt) * (tick.J_free @ tick.qd_fixed)
-        qp.feasible(qd_ahead=rest, eps=left, scale=0, **limits.feasible(rest))
+        qp.feasible(motion=0, eps=left, scale=0, **limits.feasible(rest))
