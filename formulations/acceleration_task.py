@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 # 10 ms, a bandwidth of 16 Hz: above what a hand does, and white noise on the hand's velocity is amplified into joint
 # accelerations ten times less than by the shortest one possible, a period of 1 ms.
 DEFAULT_TIME_CONSTANT: Final = 0.01
-# Weights of the penalties on yielding, against task costs of 1/2 |v|^2, so some 0.5 for a fast hand; see
-# docs/acceleration-level.md for how they were chosen.
-STRETCH_PENALTY: Final = 10.0
-TORQUE_STRETCH_PENALTY: Final = 100.0
+# Weight of exceeding acceleration limits, where the task costs 1/2 |eps|^2, some 0.5 for a fast hand; a hundred times
+# that where the task has `DIRECTION_WEIGHT`. Torque limits have a tenth of it. Evidence: docs/acceleration-level.md.
+STRETCH_PENALTY: Final = 100.0
+SCALED_STRETCH_PENALTY: Final = 1e4
 # Of leaving the hand's direction, in the formulations that keep to it: 1 cm/s costs a twentieth of standing still.
 DIRECTION_WEIGHT: Final = 1e3
 
@@ -87,12 +87,12 @@ class HandAcceleration:
 class YieldingLimits:
     """Limits on the acceleration of a formulation, and what gives way where they leave nothing.
 
-    In this order: the locked rows hold exactly; position and velocity limits ("joint limits") hold; torque limits, if
-    asked for, stretch by one common factor 1 + `torque_stretch` only if nothing else is possible; acceleration limits
-    by one common factor 1 + `stretch`; then comes the task. Both stretches carry the cost 1/2 w (1 + s)^2 with s >= 0.
-    Its slope at zero, w, makes it an exact penalty: unlike with 1/2 w s^2 the answer has s = 0 wherever that is
-    possible, as long as the task gains less than w from a unit of s. Between the two stretches the order is one of
-    weights, ten to one.
+    In this order: the locked rows hold exactly; position and velocity limits ("joint limits") hold; acceleration limits
+    stretch by one common factor 1 + `stretch` only if nothing else is possible; torque limits, if asked for, by one
+    common factor 1 + `torque_stretch`; then comes the task. (An arm whose motors can't hold it is not let fall faster
+    than its acceleration limits.) Both stretches carry the cost 1/2 w (1 + s)^2 with s >= 0. Its slope at zero, w,
+    makes it an exact penalty: unlike with 1/2 w s^2 the answer has s = 0 wherever that is possible, as long as what
+    comes after it gains less than w from a unit of s.
 
     Attributes
     ----------
@@ -108,12 +108,19 @@ class YieldingLimits:
 
     @classmethod
     def declare(
-        cls, qp: QuadraticProgram, tick: Tick, hand: HandAcceleration, ahead: ca.SX, *, torques: bool
+        cls,
+        qp: QuadraticProgram,
+        tick: Tick,
+        hand: HandAcceleration,
+        ahead: ca.SX,
+        *,
+        torques: bool,
+        penalty: float = STRETCH_PENALTY,
     ) -> YieldingLimits:
-        """Add limits on `ahead`, affine in the variables, (nv, 1) [rad/s or m/s], and parameters of their penalties."""
+        """Add limits on `ahead`, affine in the variables, (nv, 1), and parameters of what exceeding them costs."""
         stretch = qp.variable("stretch", 1)
-        penalty = tick.parameter("stretch_penalty", STRETCH_PENALTY, lowest=0.0, positive=True)
-        qp.minimize(1 + stretch, weight=penalty, name="acceleration limits")
+        weight = tick.parameter("stretch_penalty", penalty, lowest=0.0, positive=True)
+        qp.minimize(1 + stretch, weight=weight, name="acceleration limits")
         qp.between(0, stretch, ca.inf, name="stretch of acceleration limits")
         qp.between(hand.ahead(tick.qd_lo), ahead, hand.ahead(tick.qd_hi), name="joint limits")
         more = (hand.T * tick.qdd_max) * stretch
@@ -121,8 +128,8 @@ class YieldingLimits:
         qp.between(-ca.inf, ahead - more, tick.qd_prev + hand.T * tick.qdd_hi, name="upper acceleration limits")
         if torques:
             stretch = qp.variable("torque_stretch", 1)
-            penalty = tick.parameter("torque_stretch_penalty", TORQUE_STRETCH_PENALTY, lowest=0.0, positive=True)
-            qp.minimize(1 + stretch, weight=penalty, name="torque limits")
+            weight = tick.parameter("torque_stretch_penalty", 0.1 * penalty, lowest=0.0, positive=True)
+            qp.minimize(1 + stretch, weight=weight, name="torque limits")
             qp.between(0, stretch, ca.inf, name="stretch of torque limits")
             tau = torque(tick, hand.acceleration(ahead))
             # An unknown limit has nothing to stretch; infinity as a coefficient would make the row NaN.
@@ -166,8 +173,8 @@ class ScaledTask:
         weight = tick.parameter("task_weight", DIRECTION_WEIGHT, size=tick.m_free, lowest=0.0, positive=True)
         qp.minimize(eps, weight=weight, name="task direction")
         scale = qp.variable("scale", 1)
-        penalty = tick.parameter("scale_penalty", 1.0, lowest=0.0, positive=True)
-        qp.minimize(2 - scale, weight=penalty, name="task scale")
+        weight = tick.parameter("scale_penalty", 1.0, lowest=0.0, positive=True)
+        qp.minimize(2 - scale, weight=weight, name="task scale")
         qp.between(0, scale, 1, name="task scale")
         moving = matmul(tick.J_free, tick.qd_prev)
         x = moving - tick.dt * hand.Jdot_qd

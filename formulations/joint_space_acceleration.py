@@ -27,9 +27,9 @@ class JointSpaceAcceleration(Formulation):
 
     with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. For the tool's last velocity and T see
     `HandAcceleration`, for s `YieldingLimits`. Both costs look ahead by T: at constant acceleration
-    :math:`\dot q_{prev} + T\ddot q` is the joint velocity then, and eps the Cartesian error. The joint velocities follow
-    those of `joint-space` with the lag T, so that self-motion dies away too; with T = dt and wide acceleration limits
-    the command is that of `joint-space`.
+    :math:`\dot q_{prev} + T\ddot q` is the joint velocity then, and eps the Cartesian error. The joint velocities
+    follow those of `joint-space` with the lag T, so that self-motion dies away too; with T = dt and wide acceleration
+    limits the command is that of `joint-space`.
 
     Parameters
     ----------

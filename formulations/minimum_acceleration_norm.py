@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from .acceleration_task import HandAcceleration, ScaledTask, YieldingLimits, locked_motion
+from .acceleration_task import SCALED_STRETCH_PENALTY, HandAcceleration, ScaledTask, YieldingLimits, locked_motion
 from .base import Formulation, SafeStop
 
 if TYPE_CHECKING:
@@ -69,7 +69,9 @@ class MinimumAccelerationNorm(Formulation):
         damping = tick.parameter("joint_damping", 0.0, lowest=0.0, unit="1/s")
         qp.minimize(qdd + damping * tick.qd_prev, weight=weight, name="acceleration norm")
         ScaledTask.declare(qp, tick, hand, ahead)
-        limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
+        limits = YieldingLimits.declare(
+            qp, tick, hand, ahead, torques=self.torque_limits, penalty=SCALED_STRETCH_PENALTY
+        )
         qp.command(hand.command(ahead))
         left = (hand.T / tick.dt) * (tick.J_free @ tick.qd_fixed)
         qp.feasible(motion=0, eps=left, scale=0, **limits.feasible(rest))

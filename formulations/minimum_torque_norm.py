@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from .acceleration_task import HandAcceleration, ScaledTask, YieldingLimits, locked_motion, torque
+from .acceleration_task import (
+    SCALED_STRETCH_PENALTY,
+    HandAcceleration,
+    ScaledTask,
+    YieldingLimits,
+    locked_motion,
+    torque,
+)
 from .base import Formulation, SafeStop
 
 if TYPE_CHECKING:
@@ -72,7 +79,9 @@ class MinimumTorqueNorm(Formulation):
         qp.minimize(torque(tick, qdd), weight=torque_weight, name="torque norm")
         qp.minimize(qdd + damping * tick.qd_prev, weight=weight, name="acceleration norm")
         ScaledTask.declare(qp, tick, hand, ahead)
-        limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
+        limits = YieldingLimits.declare(
+            qp, tick, hand, ahead, torques=self.torque_limits, penalty=SCALED_STRETCH_PENALTY
+        )
         qp.command(hand.command(ahead))
         left = (hand.T / tick.dt) * (tick.J_free @ tick.qd_fixed)
         qp.feasible(motion=0, eps=left, scale=0, **limits.feasible(rest))
