@@ -25,6 +25,9 @@ DEFAULT_TIME_CONSTANT: Final = 0.01
 # that where the task has `DIRECTION_WEIGHT`. Torque limits have a tenth of it. Evidence: docs/acceleration-level.md.
 STRETCH_PENALTY: Final = 100.0
 SCALED_STRETCH_PENALTY: Final = 1e4
+# Stretch at which the slope of its penalty has doubled: beyond any that a calm arm needs. With a curvature as large as
+# the slope, states that need a large stretch would have gradients next to which the joint weights drown.
+STRETCH_SCALE: Final = 100.0
 # Of leaving the hand's direction, in the formulations that keep to it: 1 cm/s costs a twentieth of standing still.
 DIRECTION_WEIGHT: Final = 1e3
 
@@ -120,7 +123,7 @@ class YieldingLimits:
         """Add limits on `ahead`, affine in the variables, (nv, 1), and parameters of what exceeding them costs."""
         stretch = qp.variable("stretch", 1)
         weight = tick.parameter("stretch_penalty", penalty, lowest=0.0, positive=True)
-        qp.minimize(1 + stretch, weight=weight, name="acceleration limits")
+        qp.minimize(1 + stretch / STRETCH_SCALE, weight=STRETCH_SCALE * weight, name="acceleration limits")
         qp.between(0, stretch, ca.inf, name="stretch of acceleration limits")
         qp.between(hand.ahead(tick.qd_lo), ahead, hand.ahead(tick.qd_hi), name="joint limits")
         more = (hand.T * tick.qdd_max) * stretch
@@ -129,7 +132,7 @@ class YieldingLimits:
         if torques:
             stretch = qp.variable("torque_stretch", 1)
             weight = tick.parameter("torque_stretch_penalty", 0.1 * penalty, lowest=0.0, positive=True)
-            qp.minimize(1 + stretch, weight=weight, name="torque limits")
+            qp.minimize(1 + stretch / STRETCH_SCALE, weight=STRETCH_SCALE * weight, name="torque limits")
             qp.between(0, stretch, ca.inf, name="stretch of torque limits")
             tau = torque(tick, hand.acceleration(ahead))
             # An unknown limit has nothing to stretch; infinity as a coefficient would make the row NaN.

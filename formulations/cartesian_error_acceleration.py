@@ -37,16 +37,16 @@ class CartesianErrorAcceleration(Formulation):
 
     .. math::
         \min_{\varepsilon, \beta, s}\ \tfrac12\,\varepsilon' W \varepsilon
-        + \tfrac12 w_\beta (1 + \beta)^2 + \tfrac12 w_s (1 + s)^2
+        + \tfrac12 w_\beta (1 + \beta)^2 + p(s)
         \quad\text{s.t.}\quad \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \ddot q_{lo} - s\,\ddot q_{max} \le (\dot q - \dot q_{prev})/dt \le \ddot q_{hi} + s\,\ddot q_{max},\quad
         s \ge 0,\quad 0 \le \beta \le 1
 
     Self-motion is out of the task's reach, as in `cartesian-error`: what there is of it in the last command dies away
     with T, or, where limits leave no time for that, as fast as `beta` must brake. eps = -w with beta = 1 is zero
-    motion, and feasible while `v_fixed` is zero. What yields to what: `YieldingLimits`; braking self-motion comes
-    before exceeding acceleration limits. With T = dt and wide acceleration limits the command is that of
-    `cartesian-error`.
+    motion, and feasible while `v_fixed` is zero. What yields to what, and the penalty p: `YieldingLimits`; braking
+    self-motion comes before exceeding acceleration limits. With T = dt and wide acceleration limits the command is that
+    of `cartesian-error`.
 
     Parameters
     ----------

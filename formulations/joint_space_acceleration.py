@@ -20,13 +20,13 @@ class JointSpaceAcceleration(Formulation):
 
     .. math::
         \min_{\varepsilon, \ddot q, s}\ \tfrac12\,\varepsilon' W \varepsilon
-        + \tfrac12\,(\dot q_{prev} + T \ddot q)' W_q (\dot q_{prev} + T \ddot q) + \tfrac12 w (1 + s)^2
+        + \tfrac12\,(\dot q_{prev} + T \ddot q)' W_q (\dot q_{prev} + T \ddot q) + p(s)
         \quad\text{s.t.}\quad J_{free}\,\ddot q + \dot J_{free}\,\dot q_{prev} = (v + \varepsilon - \dot x)/T,\quad
         J_{fixed}\,\dot q = v_{fixed},\quad \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \ddot q_{lo} - s\,\ddot q_{max} \le \ddot q \le \ddot q_{hi} + s\,\ddot q_{max},\quad s \ge 0
 
     with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. For the tool's last velocity and T see
-    `HandAcceleration`, for s `YieldingLimits`. Both costs look ahead by T: at constant acceleration
+    `HandAcceleration`, for s and its penalty p `YieldingLimits`. Both costs look ahead by T: at constant acceleration
     :math:`\dot q_{prev} + T\ddot q` is the joint velocity then, and eps the Cartesian error. The joint velocities
     follow those of `joint-space` with the lag T, so that self-motion dies away too; with T = dt and wide acceleration
     limits the command is that of `joint-space`.

@@ -23,14 +23,14 @@ class MinimumAccelerationNorm(Formulation):
     .. math::
         \min_{\ddot q, \varepsilon, \sigma, s}\
         \tfrac12\,(\ddot q + k\,\dot q_{prev})' W_{\ddot q}\,(\ddot q + k\,\dot q_{prev})
-        + \tfrac12\,\varepsilon' W \varepsilon + \tfrac12 w_\sigma (2 - \sigma)^2 + \tfrac12 w_s (1 + s)^2
+        + \tfrac12\,\varepsilon' W \varepsilon + \tfrac12 w_\sigma (2 - \sigma)^2 + p(s)
         \quad\text{s.t.}\quad J_{free}\,\dot q = \sigma\,v_{next} + (dt/T)\,\varepsilon,\quad
         J_{fixed}\,\dot q = v_{fixed},\quad \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \ddot q_{lo} - s\,\ddot q_{max} \le \ddot q \le \ddot q_{hi} + s\,\ddot q_{max},\quad
         0 \le \sigma \le 1,\quad s \ge 0
 
     with command :math:`\dot q = \dot q_{prev} + dt\,\ddot q`. How the task is scaled: `ScaledTask`. What yields to
-    what: `YieldingLimits`; the task gives way before acceleration limits are exceeded.
+    what, and the penalty p: `YieldingLimits`; the task gives way before acceleration limits are exceeded.
 
     MAN proper has k = 0. It then never takes self-motion out of the arm once it is there: O'Neil (2002) shows that
     joint velocities may grow without bound while the tool moves on calmly; here the limits end that. `joint_damping` k

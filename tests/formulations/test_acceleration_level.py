@@ -61,7 +61,7 @@ def stretch(name: str, robot: str, mode: str, instance: Instance) -> float:
 
 
 def admissible(robot: Robot, mode: str, count: int, seed: int = 0) -> list[tuple[Array, Array, Array]]:
-    """Draw (q, qd_prev, v) as a tick of `joint-space` leaves them, half at limits; the hand may have changed its mind."""
+    """Draw (q, qd_prev, v) as a tick of `joint-space` leaves them, half at limits; the hand may change its mind."""
     rng, step = np.random.default_rng(seed), velocity_step(robot, mode)
     states: list[tuple[Array, Array, Array]] = []
     while len(states) < count:
@@ -88,7 +88,7 @@ def tool_speed(robot: Robot, mode: Mode, q: Array, qd: Array) -> tuple[Array, Ar
 @pytest.mark.parametrize("name", ["cartesian-error", "joint-space"])
 @pytest.mark.parametrize("mode", MODES)
 def test_without_lag_and_acceleration_limits_it_is_the_velocity_level(name: str, mode: str) -> None:
-    for robot in ("lbr_med14", "ur5e"):
+    for robot in ("lbr_med14",) if mode != "line:z" else ("lbr_med14", "ur5e"):
         below, above = evaluator(robot, name, mode), evaluator(robot, f"{name}-acceleration", mode)
         for q, qd, v in admissible(arm(robot), mode, 8):
             # The velocity bounds depend on qdd_max too: they are made the same by limits that are never near.
@@ -183,7 +183,9 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
         *(qd >= low, qd <= high),
         *(qdd >= (slowest - qd_prev) / DT - more, qdd <= (fastest - qd_prev) / DT + more),
     ]
-    objective = (0.5 * 1e4 if name.startswith("minimum") else 0.5 * 100.0) * cvxpy.square(1 + s)
+    # 50 w (1 + s/100)^2, w the slope at zero.
+    slope = 1e4 if name.startswith("minimum") else 100.0
+    objective = 50.0 * slope * cvxpy.square(1 + s / 100.0)
     if name != "cartesian-error-acceleration" and mode.m_fixed:
         constraints.append(J_fixed @ qd == 0)
     if name.startswith("minimum"):
@@ -214,7 +216,7 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
     if torque_limits:
         tau, r = robot.mass_matrix(q) @ qdd + robot.bias_forces(q, qd_prev), cvxpy.Variable(nonneg=True)
         constraints.append(cvxpy.abs(tau) <= (1 + r) * (0.2 * robot.tau_max))
-        objective += (0.5 * 1e3 if name.startswith("minimum") else 0.5 * 10.0) * cvxpy.square(1 + r)
+        objective += 5.0 * slope * cvxpy.square(1 + r / 100.0)
     problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
     tolerances = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     problem.solve(solver=cvxpy.CLARABEL, **tolerances)  # type: ignore[no-untyped-call]  # cvxpy has no stubs for it
@@ -281,9 +283,9 @@ def check_feasible(name: str, robot: str, mode: str, count: int, *, torque_limit
 
 @pytest.mark.parametrize("name", NAMES)
 def test_stopping_is_feasible(name: str) -> None:
-    for robot in ARMS:
-        for mode in MODES:
-            check_feasible(name, robot, mode, 200)
+    for robot, modes in (("lbr_med14", MODES[2:]), ("ur5e", MODES[:1]), ("panda", MODES[1:2])):
+        for mode in modes:
+            check_feasible(name, robot, mode, 400)
     check_feasible(name, "lbr_med14", "fix-orientation", 200, torque_limits=True)
 
 
