@@ -212,11 +212,9 @@ def test_error_based_ones_slide_along_the_limit_to_the_end(name: str) -> None:
     on_limit = trajectory.q[:, ELBOW] - s.robot.q_min[ELBOW] <= 1e-6
     assert 0.3 < on_limit.mean() < 0.35
     assert not on_limit[-1]
-    below = simulate(
-        make_step(s.robot, name.removesuffix("-acceleration"), s.mode, "active-set"),
-        s.guide, s.q0, s.duration, dt=s.dt,
-    )  # fmt: skip
-    assert np.linalg.norm(trajectory.position[-1] - below.position[-1]) < 2e-3  # the lag, 10 ms at the last speed
+    # At the end of the path, but for the lag.
+    assert np.linalg.norm(trajectory.v[-1]) < 5e-3
+    assert np.linalg.norm(trajectory.eps[-1]) < 5e-3
 
 
 @pytest.mark.parametrize("name", NAMES[2:])

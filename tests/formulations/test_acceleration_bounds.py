@@ -80,8 +80,8 @@ def check_consistency(count: int, ticks: int, seed: int) -> None:
 
 
 def test_once_inside_always_inside() -> None:
-    check_consistency(100_000, 10, 0)
-    check_consistency(2_000, 300, 1)
+    check_consistency(100_000, 4, 0)
+    check_consistency(1_000, 150, 1)
 
 
 @pytest.mark.long
@@ -96,16 +96,16 @@ def test_zero_velocity_is_reached_at_full_braking() -> None:
     low, high, _, _ = bounds_of(joints | {"qd_prev": np.zeros(2_000)})
     qd = rng.uniform(low, high)
     needed = np.ceil(np.abs(qd) / (a * dt) * (1.0 - 1e-12))
-    kept = needed < 500
+    kept = needed < 250
     joints = {name: value[kept] for name, value in joints.items()}
     qd, a, dt, needed = qd[kept], a[kept], dt[kept], needed[kept]
-    for tick in range(500):
+    for tick in range(250):
         joints["q"] = joints["q"] + dt * qd
         _, _, qdd_lo, qdd_hi = bounds_of(joints | {"qd_prev": qd})
         qd = qd + dt * np.clip(-qd / dt, qdd_lo, qdd_hi)
         stopped = tick + 1 >= needed
         assert np.abs(qd[stopped]).max(initial=0.0) <= 1e-12
-    assert needed.max() > 300
+    assert needed.max() > 150
 
 
 @SETTINGS

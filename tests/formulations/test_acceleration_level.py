@@ -41,6 +41,10 @@ NAMES = (
     "minimum-torque-norm",
 )
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
+# In quick runs two modes stand for all.
+SOME_MODES = [
+    pytest.param(mode, marks=() if mode in ("fix-orientation", "free") else pytest.mark.long) for mode in MODES
+]
 ARMS = ("lbr_med14", "ur5e", "panda")
 T = DEFAULT_TIME_CONSTANT
 WIDE = {"qdd_max": 1e6}
@@ -86,9 +90,9 @@ def tool_speed(robot: Robot, mode: Mode, q: Array, qd: Array) -> tuple[Array, Ar
 
 
 @pytest.mark.parametrize("name", ["cartesian-error", "joint-space"])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", SOME_MODES)
 def test_without_lag_and_acceleration_limits_it_is_the_velocity_level(name: str, mode: str) -> None:
-    for robot in ("lbr_med14",) if mode != "line:z" else ("lbr_med14", "ur5e"):
+    for robot in ("lbr_med14", "ur5e"):
         below, above = evaluator(robot, name, mode), evaluator(robot, f"{name}-acceleration", mode)
         for q, qd, v in admissible(arm(robot), mode, 8):
             # The velocity bounds depend on qdd_max too: they are made the same by limits that are never near.
@@ -98,7 +102,7 @@ def test_without_lag_and_acceleration_limits_it_is_the_velocity_level(name: str,
             np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9 * max(1.0, float(np.abs(wanted).max())))
 
 
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", SOME_MODES)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_tool_follows_the_hand_with_a_lag_of_first_order(name: str, mode: str) -> None:
     """J qd = x + (dt/T)(v - x): the curvature of the path cancels, and the locked rows hold."""
@@ -173,7 +177,8 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
     J_free, J_fixed = rows_at(robot, mode, q)
     low, high = bounds_at(robot, q)
     x, rate = tool_speed(robot, mode, q, qd_prev)
-    qdd, s = cvxpy.Variable(robot.nv), cvxpy.Variable(nonneg=True)
+    change, s = cvxpy.Variable(robot.nv), cvxpy.Variable(nonneg=True)
+    qdd = change / T  # cvxpy's solver needs numbers of order one too
     eps = cvxpy.Variable(mode.m_free)
     qd, ahead = qd_prev + DT * qdd, qd_prev + T * qdd
     slowest = np.minimum(np.maximum(low, qd_prev - DT * robot.qdd_max), high)
@@ -183,9 +188,9 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
         *(qd >= low, qd <= high),
         *(qdd >= (slowest - qd_prev) / DT - more, qdd <= (fastest - qd_prev) / DT + more),
     ]
-    # 50 w (1 + s/100)^2, w the slope at zero.
+    # 50 w (1 + s/100)^2 less the constant 50 w, which would cost digits; w is the slope at zero.
     slope = 1e4 if name.startswith("minimum") else 100.0
-    objective = 50.0 * slope * cvxpy.square(1 + s / 100.0)
+    objective = slope * (s + cvxpy.square(s) / 200.0)
     if name != "cartesian-error-acceleration" and mode.m_fixed:
         constraints.append(J_fixed @ qd == 0)
     if name.startswith("minimum"):
@@ -216,16 +221,16 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
     if torque_limits:
         tau, r = robot.mass_matrix(q) @ qdd + robot.bias_forces(q, qd_prev), cvxpy.Variable(nonneg=True)
         constraints.append(cvxpy.abs(tau) <= (1 + r) * (0.2 * robot.tau_max))
-        objective += 5.0 * slope * cvxpy.square(1 + r / 100.0)
+        objective += 0.1 * slope * (r + cvxpy.square(r) / 200.0)
     problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
-    tolerances = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+    tolerances = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
     problem.solve(solver=cvxpy.CLARABEL, **tolerances)  # type: ignore[no-untyped-call]  # cvxpy has no stubs for it
     assert problem.status == cvxpy.OPTIMAL
     return np.asarray(qd.value)
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("mode", ["fix-orientation", "rcm:-0.12", "free"])
+@pytest.mark.parametrize("mode", [*SOME_MODES, pytest.param("rcm:-0.12", marks=pytest.mark.long)])
 def test_cvxpy_agrees(name: str, mode: str) -> None:
     evaluate, hindered = evaluator("lbr_med14", name, mode), 0
     for q, qd, v in admissible(arm("lbr_med14"), mode, 8, seed=5):
@@ -283,7 +288,7 @@ def check_feasible(name: str, robot: str, mode: str, count: int, *, torque_limit
 
 @pytest.mark.parametrize("name", NAMES)
 def test_stopping_is_feasible(name: str) -> None:
-    for robot, modes in (("lbr_med14", MODES[2:]), ("ur5e", MODES[:1]), ("panda", MODES[1:2])):
+    for robot, modes in (("lbr_med14", MODES[2:5]), ("ur5e", MODES[:1]), ("panda", MODES[-1:])):
         for mode in modes:
             check_feasible(name, robot, mode, 400)
     check_feasible(name, "lbr_med14", "fix-orientation", 200, torque_limits=True)
