@@ -27,7 +27,7 @@ STRETCH_PENALTY: Final = 100.0
 SCALED_STRETCH_PENALTY: Final = 1e4
 # Stretch at which the slope of its penalty has doubled: beyond any that a calm arm needs. With a curvature as large as
 # the slope, states that need a large stretch would have gradients next to which the joint weights drown.
-STRETCH_SCALE: Final = 100.0
+STRETCH_SCALE: Final = 30.0
 # Of leaving the hand's direction, in the formulations that keep to it: 1 cm/s costs a twentieth of standing still.
 DIRECTION_WEIGHT: Final = 1e3
 

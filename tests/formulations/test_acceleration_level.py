@@ -188,9 +188,9 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
         *(qd >= low, qd <= high),
         *(qdd >= (slowest - qd_prev) / DT - more, qdd <= (fastest - qd_prev) / DT + more),
     ]
-    # 50 w (1 + s/100)^2 less the constant 50 w, which would cost digits; w is the slope at zero.
+    # 15 w (1 + s/30)^2 less the constant 15 w, which would cost digits; w is the slope at zero.
     slope = 1e4 if name.startswith("minimum") else 100.0
-    objective = slope * (s + cvxpy.square(s) / 200.0)
+    objective = slope * (s + cvxpy.square(s) / 60.0)
     if name != "cartesian-error-acceleration" and mode.m_fixed:
         constraints.append(J_fixed @ qd == 0)
     if name.startswith("minimum"):
@@ -221,7 +221,7 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
     if torque_limits:
         tau, r = robot.mass_matrix(q) @ qdd + robot.bias_forces(q, qd_prev), cvxpy.Variable(nonneg=True)
         constraints.append(cvxpy.abs(tau) <= (1 + r) * (0.2 * robot.tau_max))
-        objective += 0.1 * slope * (r + cvxpy.square(r) / 200.0)
+        objective += 0.1 * slope * (r + cvxpy.square(r) / 60.0)
     problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
     tolerances = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
     problem.solve(solver=cvxpy.CLARABEL, **tolerances)  # type: ignore[no-untyped-call]  # cvxpy has no stubs for it
