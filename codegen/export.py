@@ -117,6 +117,7 @@ def export_c(
         shared
         | {
             "formulation": code.formulation,
+            "brake": bool(code.brake_body),
             "robot": code.robot,
             "version": library_version(),
             "ticks": len(recorded.mode),

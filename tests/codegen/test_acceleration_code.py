@@ -174,9 +174,12 @@ def test_what_is_not_finite_stops_its_own_tick_only() -> None:
     np.testing.assert_allclose(result.qd[3], 0.19, atol=1e-15)  # the hand's velocity isn't needed to brake
 
 
-def test_exported_code_gives_the_recorded_answers(tmp_path: Path) -> None:
-    """With the last command as an input of every recorded tick."""
-    export_c(arm("lbr_med14"), "cartesian-error-acceleration", ["fix-orientation", "line:z"], tmp_path, name="lbr")
+@pytest.mark.parametrize(
+    "modes", [["fix-orientation"], pytest.param(["fix-orientation", "line:z", "free"], marks=pytest.mark.long)]
+)
+def test_exported_code_gives_the_recorded_answers(modes: list[str], tmp_path: Path) -> None:
+    """With the last command as an input of every recorded tick; one mode, and several, which bring other code."""
+    export_c(arm("lbr_med14"), "cartesian-error-acceleration", modes, tmp_path, name="lbr")
     compiler = shutil.which("cc") or shutil.which("gcc")
     assert compiler is not None
     flags = ["-std=c99", "-O0", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-ffp-contract=off"]
@@ -187,7 +190,10 @@ def test_exported_code_gives_the_recorded_answers(tmp_path: Path) -> None:
     assert built.returncode == 0, built.stderr
     done = subprocess.run([str(tmp_path / "check")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
-    assert "400 ticks" in done.stdout
+    assert f"{200 * len(modes)} ticks" in done.stdout
+    readme = (tmp_path / "README.md").read_text()
+    assert "input.qd_prev: what was sent last" in readme
+    assert "output.qd is the fastest admissible braking: the safe stop" in readme
     header = (tmp_path / "lbr.h").read_text()
     assert "the fastest admissible braking unless solved" in header
     assert "double qd_prev[7]; /* joint velocities of the tick before [rad/s or m/s] */" in header
