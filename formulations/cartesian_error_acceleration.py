@@ -60,7 +60,7 @@ class CartesianErrorAcceleration(Formulation):
     time_constant
         T [s]; at least one period.
     brake_penalty, stretch_penalty, torque_stretch_penalty
-        w of beta and of the two stretches.
+        w_beta, and the slopes of p at zero for the two stretches.
     """
 
     torque_limits: bool = False

@@ -43,7 +43,7 @@ class JointSpaceAcceleration(Formulation):
     time_constant
         T [s]; at least one period.
     stretch_penalty, torque_stretch_penalty
-        w of the two stretches.
+        Slopes of p at zero for the two stretches.
     """
 
     torque_limits: bool = False

@@ -52,7 +52,7 @@ class MinimumAccelerationNorm(Formulation):
     time_constant
         See `HandAcceleration` [s].
     scale_penalty, stretch_penalty, torque_stretch_penalty
-        w of sigma and of the two stretches.
+        w_sigma, and the slopes of p at zero for the two stretches.
     """
 
     torque_limits: bool = False
