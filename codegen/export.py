@@ -43,12 +43,13 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class Recorded:
-    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free)."""
+    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free); qd_prev (N, nv) where it is an input."""
 
     mode: NDArray[np.int64]
     q: Array
     v: Array
     qd: Array
+    qd_prev: Array | None
 
 
 def export_c(
@@ -102,7 +103,13 @@ def export_c(
     files = render_step(code)
     recorded = record(robot, made, parsed)
     templates = environment()
-    shared = {"p": prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
+    shared = {
+        "p": prefix,
+        "nv": code.nv,
+        "m_free": code.m_free,
+        "rows": code.rows,
+        "previous": recorded.qd_prev is not None,
+    }
     files["main.c"] = templates.get_template("main.c.j2").render(shared | {"tolerance": number(TOLERANCE)})
     files["recorded.h"] = recorded_header(recorded, code)
     files["CMakeLists.txt"] = templates.get_template("CMakeLists.txt.j2").render(shared)
@@ -110,6 +117,7 @@ def export_c(
         shared
         | {
             "formulation": code.formulation,
+            "brake": bool(code.brake_body),
             "robot": code.robot,
             "version": library_version(),
             "ticks": len(recorded.mode),
@@ -140,7 +148,8 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
     low = np.where(np.isfinite(robot.q_min), robot.q_min, -np.pi)
     high = np.where(np.isfinite(robot.q_max), robot.q_max, np.pi)
     rng = np.random.default_rng(0)
-    columns: list[tuple[int, Array, Array, Array]] = []
+    columns: list[tuple[int, Array, Array, Array, Array]] = []
+    needs_previous = False
     for index, mode in enumerate(modes):
         evaluate = Evaluator(lower(formulation, robot, mode))
         needs_previous = any(given.name == "qd_prev" for given in evaluate.inputs)
@@ -156,20 +165,21 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
             instance = evaluate(q=q, v=v, **previous)
             solution = solver.solve(instance.qp)
             if not solution.solved:
-                qd = np.zeros(robot.nv)
+                qd = instance.stop
                 q = q + 1e-3 * rng.normal(size=robot.nv)
                 continue
-            qd = instance.K @ solution.x + instance.k
-            columns.append((index, q, v, qd))
+            before, qd = qd, instance.K @ solution.x + instance.k
+            columns.append((index, q, v, qd, before))
             q = q + 1e-3 * qd
     if not columns:
         raise ExportError(f"{formulation.name} on {robot.name}: expected ticks that can be solved, got none")
     widest = max(mode.m_free for mode in modes)
     return Recorded(
         np.array([index for index, *_ in columns]),
-        np.array([q for _, q, _, _ in columns]),
-        np.array([np.pad(v, (0, widest - len(v))) for *_, v, _ in columns]),
-        np.array([qd for *_, qd in columns]),
+        np.array([q for _, q, _, _, _ in columns]),
+        np.array([np.pad(v, (0, widest - len(v))) for _, _, v, _, _ in columns]),
+        np.array([qd for _, _, _, qd, _ in columns]),
+        np.array([before for *_, before in columns]) if needs_previous else None,
     )
 
 
@@ -185,6 +195,8 @@ def recorded_header(recorded: Recorded, code: StepCode) -> str:
         f"static const int recorded_mode[TICKS] = {{{', '.join(map(str, recorded.mode))}}};",
     ]
     units = {"q": "rad or m", "v": "m/s, rad/s", "qd": "rad/s or m/s"}
+    if recorded.qd_prev is not None:
+        units["qd_prev"] = units["qd"]
     for name, unit in units.items():
         table: Array = getattr(recorded, name)
         lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[TICKS][{table.shape[1]}] = {{"]

@@ -15,7 +15,7 @@ from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from ..formulations import Cut, Formulation, Input, Lowered, Mode
     from ..robots import Robot
@@ -43,6 +43,14 @@ _COMMENTS: Final = {
     "joint_weight": "weights of the joint velocities",
     "damping_threshold": "smallest singular value below which damping sets in",
     "damping_max": "damping at the singularity",
+    "time_constant": "lag of the tool behind the hand; at least one period",
+    "stretch_penalty": "weight of exceeding acceleration limits",
+    "torque_stretch_penalty": "weight of exceeding torque limits",
+    "brake_penalty": "weight of braking self-motion",
+    "scale_penalty": "weight of slowing the task down",
+    "acceleration_weight": "weights of the joint accelerations",
+    "torque_weight": "weights of the joint torques",
+    "joint_damping": "rate at which self-motion dies away",
 }
 
 
@@ -178,6 +186,8 @@ class StepCode:
     parameters, inputs : tuple of Field
         Of the two structs; the largest size over the modes.
     modes : tuple of ModeCode
+    brake_body : tuple of str
+        Statements of the safe stop by braking; empty where the safe stop is zero velocity.
     """
 
     prefix: str
@@ -191,6 +201,7 @@ class StepCode:
     parameters: tuple[Field, ...]
     inputs: tuple[Field, ...]
     modes: tuple[ModeCode, ...]
+    brake_body: tuple[str, ...]
 
     @property
     def sizes(self) -> tuple[tuple[int, int], ...]:
@@ -222,6 +233,7 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
         parameters=tuple(_field(given) for name, given in largest.items() if name not in _SIGNALS),
         inputs=tuple(_field(given) for name, given in largest.items() if name in _SIGNALS),
         modes=codes,
+        brake_body=_brake_body(lower(formulation, robot, modes[0])) if formulation.safe_stop == "braking" else (),
     )
 
 
@@ -241,11 +253,7 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
     lowered, reduced = _lower_for_c(formulation, robot, mode)
     inputs, tick = lowered.inputs, lowered.tick
     fields = {given.name: _field(given) for given in inputs}
-    # A parameter that is a plain number is read through its address, as an array of one.
-    sources = {
-        name: f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
-        for name, field in fields.items()
-    }
+    sources = _sources(fields)
     shape = Shape.of(reduced)
     outputs = _outputs(lowered, reduced, shape)
     cuts = used(tick.cuts, list(outputs.values()))
@@ -295,6 +303,21 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
         rows=reduced.rows,
         inputs=inputs,
     )
+
+
+def _sources(fields: Mapping[str, Field]) -> dict[str, str]:
+    # A parameter that is a plain number is read through its address, as an array of one.
+    return {
+        name: f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
+        for name, field in fields.items()
+    }
+
+
+def _brake_body(lowered: Lowered) -> tuple[str, ...]:
+    brake = ca.densify(lowered.tick.qd_brake)
+    function = ca.Function("brake", [given.symbol for given in lowered.inputs], [brake])
+    sources = _sources({given.name: _field(given) for given in lowered.inputs})
+    return tuple(emit(function, list(sources.values()), ["qd"]))
 
 
 def _identical(a: ca.SX, b: ca.SX) -> bool:

@@ -75,6 +75,8 @@ def render_step(code: StepCode) -> dict[str, str]:
         "drift": any(field.name == "v_fixed" and field.size for field in code.inputs),
         "rows": code.rows,
         "max_iterations": code.max_iterations,
+        "brake": code.brake_body,
+        "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
     }
     templates = environment()
     return {
@@ -85,7 +87,8 @@ def render_step(code: StepCode) -> dict[str, str]:
 
 def render_batch(code: StepCode) -> str:
     """Fill in the function that Python calls for many ticks at once."""
-    values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
+    signals = [field for field in code.inputs if field.name not in ("q", "v")]
+    values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows, "signals": signals}
     return environment().get_template("batch.c.j2").render(values)
 
 

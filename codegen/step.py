@@ -16,6 +16,8 @@ from .model import identifier, step_code
 from .render import render_batch, render_step
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from numpy.typing import ArrayLike, NDArray
 
     from ..formulations import Formulation, Input
@@ -37,8 +39,8 @@ class TickResult(NamedTuple):
     Attributes
     ----------
     qd : ndarray, shape (nv,)
-        Joint velocity command [rad/s or m/s]; zero (the safe stop) unless `status` is SOLVED, or MAX_ITERATIONS of a
-        step that keeps to admissible points.
+        Joint velocity command [rad/s or m/s]; the safe stop (zero, or the fastest admissible braking; see
+        `Formulation.safe_stop`) unless `status` is SOLVED, or MAX_ITERATIONS of a step that keeps to admissible points.
     eps : ndarray, shape (m_free,)
         Cartesian error J_free qd - v [m/s, rad/s].
     status : Status
@@ -225,7 +227,8 @@ class CompiledStep:
         V : array_like, shape (N, m_free)
             Velocities that the hand asks for [m/s, rad/s].
         **inputs : array_like
-            Parameters (limits, weights, `dt`), the same for all states.
+            Parameters (limits, weights, `dt`), the same for all states; and, of shape (N, size), what is new at every
+            tick (`qd_prev`, `v_fixed`).
 
         Raises
         ------
@@ -239,12 +242,8 @@ class CompiledStep:
         for name, values, shape in (("Q", states, shapes[0]), ("V", twists, shapes[1])):
             if values.shape != shape:
                 raise InputError(f"{name}: expected shape {shape}, got {values.shape}")
-        for name in inputs:
-            if name in self._signals:
-                raise InputError(f"{name}: expected parameters, the same for all states, got an input of single ticks")
-        for name in self._required:
-            if name in self._signals:
-                raise InputError(f"{name}: expected single calls where this is new at every tick, got a batch")
+        signals = {name: self._signal(name, inputs, len(states)) for name in self._signals if name not in ("q", "v")}
+        inputs = {name: value for name, value in inputs.items() if name not in signals}
         count, rows = len(states), self.code.rows
         result = BatchResult(
             np.empty_like(states),
@@ -254,9 +253,10 @@ class CompiledStep:
             np.empty((count, rows), dtype=np.intc),
             self.code.modes[0].rows,
         )
-        restore = self._override(inputs)
+        restore = self._override(inputs, given=signals)
         try:
-            doubles = [self._pointer("double *", x) for x in (states, twists, result.qd, result.eps)]
+            per_tick = [signals[field.name] for field in self.code.inputs if field.name not in ("q", "v")]
+            doubles = [self._pointer("double *", x) for x in (states, twists, *per_tick, result.qd, result.eps)]
             integers = [self._pointer("int *", x) for x in (result.codes, result.iterations, result.sides)]
             self._run_batch(self._parameters, 0, count, *doubles, *integers)
         finally:
@@ -264,7 +264,22 @@ class CompiledStep:
                 values[:] = before
         return result
 
-    def _override(self, inputs: dict[str, ArrayLike]) -> list[tuple[Array, Array]]:
+    def _signal(self, name: str, inputs: dict[str, ArrayLike], count: int) -> Array:
+        """One row for each tick of a batch; none at all where it is left out, which stands for zeros."""
+        size = self._specs[name].size
+        if name not in inputs:
+            if name in self._required:
+                raise InputError(f"{name}: expected shape ({count}, {size}), got nothing")
+            return np.zeros(0)
+        try:
+            values = np.ascontiguousarray(inputs[name], dtype=float)
+        except (TypeError, ValueError):
+            raise InputError(f"{name}: expected shape ({count}, {size}), got {inputs[name]!r}") from None
+        if values.shape != (count, size):
+            raise InputError(f"{name}: expected shape ({count}, {size}), one row for each tick, got {values.shape}")
+        return values
+
+    def _override(self, inputs: dict[str, ArrayLike], given: Container[str] = ()) -> list[tuple[Array, Array]]:
         checked: list[tuple[Array, Array]] = []
         for name, value in inputs.items():
             if name not in self._specs or name in ("q", "v"):
@@ -272,7 +287,7 @@ class CompiledStep:
             values = self._signals[name] if name in self._signals else self._fields[name]
             checked.append((values, np.broadcast_to(check_input(self._specs[name], value, self.mode), values.shape)))
         for name in self._required:
-            if name not in inputs:
+            if name not in inputs and name not in given:
                 raise InputError(f"{name}: expected shape ({self._specs[name].size},), got nothing")
         self._check_limits(inputs)
         restore = [(values, values.copy()) for values, _ in checked]
@@ -339,9 +354,12 @@ def compile_step(
         raise ValueError(f"solver: expected one that is generated as C ({known}), got {solver!r}; see make_step")
     if solver == qrqp.NAME and (feasible or max_iterations is not None):
         raise ValueError(f"feasible, max_iterations: expected neither with {solver}, which doesn't take them")
+    made = get_formulation(formulation)
+    if solver == qrqp.NAME and made.safe_stop != "zero":
+        raise ValueError(f"solver: expected {SOLVER} for {made.name}, whose safe stop is braking, got {solver!r}")
     return CompiledStep(
         robot,
-        get_formulation(formulation),
+        made,
         Mode.parse(mode) if isinstance(mode, str) else mode,
         solver,
         feasible=feasible,

@@ -31,8 +31,9 @@ class InterpretedStep:
     """A formulation on a robot in a mode, solved by any solver, called once per control period.
 
     A command is sent only if the solver's answer holds: finite, within the bounds to `BOUND_TOLERANCE`, the locked
-    rows exact to `FIXED_TOLERANCE` relative to the joint speed's share in them. Otherwise the command is the safe
-    stop, zero velocity, which no bound excludes, and `status` says why.
+    rows exact to `FIXED_TOLERANCE` relative to the joint speed's share in them. Otherwise the command is the
+    formulation's safe stop, and `status` says why: zero velocity, which no bound excludes, or the fastest admissible
+    braking (`Formulation.safe_stop`).
 
     Not to be shared between threads.
     """
@@ -107,7 +108,7 @@ class InterpretedStep:
         elif status is Status.SOLVED:
             status, message = Status.INACCURATE, "the command is not finite"
         solved = status is Status.SOLVED
-        command = qd if solved else np.zeros(self.robot.nv)
+        command = qd if solved else instance.stop
         return StepResult(
             qd=command,
             eps=instance.J_free @ command - instance.v,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from .bounds import BOUNDS
 
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from .tick import Tick
     from .to_cvxpy import CvxpyProblem
 
+SafeStop = Literal["zero", "braking"]
+
 
 @dataclass(frozen=True)
 class Formulation(ABC):
@@ -33,11 +35,18 @@ class Formulation(ABC):
     ----------
     bounds : {"viable", "thesis"}
         How joint velocity bounds follow from the limits; see `kinqp.formulations.velocity_bounds`.
+
+    Notes
+    -----
+    `safe_stop` says what is sent where a tick is not solved: zero velocity at once, or, for a formulation that keeps to
+    acceleration limits, the fastest admissible braking from the last command (`kinqp.formulations.braking`). The
+    latter makes `qd_prev` an input of every step.
     """
 
     bounds: str = "viable"
 
     name: ClassVar[str]
+    safe_stop: ClassVar[SafeStop] = "zero"
 
     def __post_init__(self) -> None:
         if self.bounds not in BOUNDS:

@@ -45,6 +45,8 @@ class Instance:
         Joint velocity bounds [rad/s or m/s].
     v, v_fixed : ndarray, shapes (m_free,) and (m_fixed,)
         What was asked of the two [m/s, rad/s].
+    stop : ndarray, shape (nv,)
+        Command of the safe stop [rad/s or m/s].
     """
 
     qp: QP
@@ -57,6 +59,7 @@ class Instance:
     qd_hi: Array
     v: Array
     v_fixed: Array
+    stop: Array
 
 
 class Evaluator:
@@ -75,6 +78,7 @@ class Evaluator:
         tick = lowered.tick
         # Also what the formulation itself does not use: its command is judged against the limits all the same.
         observed = {name: getattr(tick, name) for name in _OBSERVED} | {"v_fixed": tick.v_fixed}
+        observed["stop"] = tick.qd_brake if lowered.formulation.safe_stop == "braking" else ca.SX.zeros(tick.nv, 1)
         data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
         self.inputs: Final[tuple[Input, ...]] = tick.inputs
         outputs = data | {name: value for name, value in observed.items() if name != "v_fixed"}
@@ -109,7 +113,7 @@ class Evaluator:
         self._fill(inputs)
         self._evaluate()
         r = {name: matrix.copy() for name, matrix in self._results.items()}
-        columns = {name: r[name][:, 0] for name in ("g", "b", "l", "u", "lb", "ub", "k", "qd_lo", "qd_hi")}
+        columns = {name: r[name][:, 0] for name in ("g", "b", "l", "u", "lb", "ub", "k", "qd_lo", "qd_hi", "stop")}
         start = r["x_feasible"]
         qp = QP.trusted(
             H=r["H"], g=columns["g"], A=r["A"], b=columns["b"], C=r["C"], l=columns["l"], u=columns["u"],
@@ -117,7 +121,7 @@ class Evaluator:
         )  # fmt: skip
         return Instance(
             qp, r["K"], columns["k"], r["J_free"], r["J_fixed"], r["J_bar"], columns["qd_lo"], columns["qd_hi"],
-            self._given["v"].copy(), self._given["v_fixed"].copy(),
+            self._given["v"].copy(), self._given["v_fixed"].copy(), columns["stop"],
         )  # fmt: skip
 
     def _fill(self, inputs: Mapping[str, ArrayLike]) -> None:

@@ -116,6 +116,8 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
     tick = Tick(robot, mode, formulation.bounds, cut=cut)
     # The state and the hand's velocity are inputs of every step, also of one that does not use them.
     _ = tick.q, tick.v
+    if formulation.safe_stop == "braking":  # ... and so is what its safe stop needs
+        _ = tick.qd_brake
     qp = QuadraticProgram()
     formulation.declare(qp, tick)
     if not qp.variables or qp.command_expression is None:

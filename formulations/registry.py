@@ -7,13 +7,27 @@ from typing import Final
 from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
+from .cartesian_error_acceleration import CartesianErrorAcceleration
 from .joint_space import JointSpace
+from .joint_space_acceleration import JointSpaceAcceleration
+from .minimum_acceleration_norm import MinimumAccelerationNorm
+from .minimum_torque_norm import MinimumTorqueNorm
 
 _REGISTRY: Final = Registry(
     "formulation",
     "kinqp.formulations",
     Formulation,  # type: ignore[type-abstract]  # only instances of it are made and checked
-    {cls.name: cls for cls in (CartesianError, JointSpace)},
+    {
+        cls.name: cls
+        for cls in (
+            CartesianError,
+            CartesianErrorAcceleration,
+            JointSpace,
+            JointSpaceAcceleration,
+            MinimumAccelerationNorm,
+            MinimumTorqueNorm,
+        )
+    },
 )
 
 

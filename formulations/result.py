@@ -21,7 +21,8 @@ class StepResult:
     Attributes
     ----------
     qd : ndarray, shape (nv,)
-        Joint velocity command [rad/s or m/s]; zero (the safe stop) unless `status` is SOLVED.
+        Joint velocity command [rad/s or m/s]; the safe stop (zero, or the fastest admissible braking; see
+        `Formulation.safe_stop`) unless `status` is SOLVED.
     eps : ndarray, shape (m_free,)
         Cartesian error J_free qd - v of that command [m/s, rad/s].
     status : Status

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 import numpy as np
 
+from .acceleration_bounds import acceleration_bounds, braking
 from .algebra import matmul
 from .bounds import BOUNDS, velocity_bounds
 from .cuts import Cut, make_cut
@@ -320,6 +321,30 @@ class Tick:
     def qd_hi(self) -> ca.SX:
         """Upper joint velocity bounds, shape (nv, 1), never negative [rad/s or m/s]."""
         return self._bounds[1]
+
+    @cached_property
+    def _acceleration_bounds(self) -> tuple[ca.SX, ca.SX]:
+        return acceleration_bounds(self.qd_prev, self.qd_lo, self.qd_hi, self.qdd_max, self.dt)
+
+    @property
+    def qdd_lo(self) -> ca.SX:
+        """Lower joint acceleration bounds, shape (nv, 1); see `acceleration_bounds` [rad/s^2 or m/s^2]."""
+        return self._acceleration_bounds[0]
+
+    @property
+    def qdd_hi(self) -> ca.SX:
+        """Upper joint acceleration bounds, shape (nv, 1); see `acceleration_bounds` [rad/s^2 or m/s^2]."""
+        return self._acceleration_bounds[1]
+
+    @cached_property
+    def qd_brake(self) -> ca.SX:
+        """Fastest admissible braking from the last command, shape (nv, 1); see `braking` [rad/s or m/s]."""
+        return braking(self.qd_prev, self.qd_lo, self.qd_hi, self.qdd_max, self.dt)
+
+    @cached_property
+    def qd_prev_free(self) -> ca.SX:
+        """Part of `qd_prev` that does not move the locked rows, N_c qd_prev, shape (nv, 1) [rad/s or m/s]."""
+        return self._fixed.project(self.qd_prev.T).T if self.m_fixed else self.qd_prev
 
     @property
     def M(self) -> ca.SX:

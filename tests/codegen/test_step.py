@@ -107,7 +107,7 @@ def test_mistakes_in_parameters_are_named_and_change_nothing(inputs: dict[str, o
 
 
 def test_q_and_v_are_not_taken_twice() -> None:
-    with pytest.raises(InputError, match="q: expected parameters, the same for all states"):
+    with pytest.raises(InputError, match="q: expected an input among"):
         lbr().batch([Q], [V], q=Q)
 
 
@@ -190,9 +190,22 @@ def test_every_parameter_reaches_the_c_code() -> None:
             assert np.abs(result.qd - step(q, 8 * V, **others).qd).max() > 1e-6, name
 
 
-def test_a_batch_takes_no_inputs_of_single_ticks() -> None:
-    with pytest.raises(InputError, match="v_fixed: expected parameters, the same for all states"):
-        lbr().batch([Q], [V], v_fixed=np.zeros(3))
+def test_a_batch_takes_a_row_for_each_tick_of_what_is_new_at_every_tick() -> None:
+    rng = np.random.default_rng(12)
+    Qs, Vs, drifts = Q + 0.1 * rng.normal(size=(5, 7)), 0.1 * rng.normal(size=(5, 3)), 0.01 * rng.normal(size=(5, 3))
+    result = lbr().batch(Qs, Vs, v_fixed=drifts, qd_max=0.5)
+    for i in range(5):
+        assert result.qd[i].tobytes() == lbr()(Qs[i], Vs[i], v_fixed=drifts[i], qd_max=0.5).qd.tobytes()
+    assert lbr().batch(Qs, Vs).qd.tobytes() == lbr().batch(Qs, Vs, v_fixed=np.zeros((5, 3))).qd.tobytes()
+    for bad in (np.zeros(3), np.zeros((4, 3)), np.zeros((5, 2)), 0.0):
+        with pytest.raises(InputError, match=r"v_fixed: expected shape \(5, 3\), one row for each tick, got"):
+            lbr().batch(Qs, Vs, v_fixed=bad)
+    with pytest.raises(InputError, match=r"v_fixed: expected shape \(5, 3\), got 'none'"):
+        lbr().batch(Qs, Vs, v_fixed="none")
+    drifts[2, 1] = np.nan
+    assert [status is Status.FAILED for status in lbr().batch(Qs, Vs, v_fixed=drifts).status] == [
+        i == 2 for i in range(5)
+    ]
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
@@ -280,7 +293,7 @@ def test_a_cap_that_is_no_count_is_refused() -> None:
 
 
 def test_solvers_without_c_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"solver: expected .* \(active-set, casadi-qrqp\), got 'clarabel'; see make_step"):
+    with pytest.raises(ValueError, match=r"solver: .* \(active-set, casadi-qrqp\), got 'clarabel'; see make_step"):
         compile_step(arm("lbr_med14"), "cartesian-error", "fix-orientation", "clarabel")
 
 
@@ -308,8 +321,10 @@ def test_inputs_without_defaults_are_asked_for() -> None:
         step(q, v, qd_prev=np.zeros(6))
     with pytest.raises(InputError, match=r"qd_prev: expected shape \(6,\), got nothing"):
         step(q, v, qd_wish=np.zeros(6))
-    with pytest.raises(InputError, match="qd_prev: expected single calls"):
+    with pytest.raises(InputError, match=r"qd_prev: expected shape \(1, 6\), got nothing"):
         step.batch([q], [v], qd_wish=np.zeros(6))
+    with pytest.raises(InputError, match=r"qd_wish: expected shape \(6,\), got nothing"):
+        step.batch([q], [v], qd_prev=np.zeros((1, 6)))
 
 
 def test_a_capped_tick_without_a_declared_point_stops() -> None:

@@ -39,6 +39,12 @@ def evaluator(robot: str, formulation: str | Formulation, mode: str) -> Evaluato
     return Evaluator(lower(get_formulation(formulation), arm(robot), Mode.parse(mode)))
 
 
+def last_command(evaluate: Evaluator, rng: np.random.Generator) -> dict[str, Array]:
+    """Draw a last command for a formulation that takes one, small enough to be admissible inside the limits."""
+    given = {spec.name: spec.size for spec in evaluate.inputs}
+    return {"qd_prev": 0.1 * rng.normal(size=given["qd_prev"])} if "qd_prev" in given else {}
+
+
 def skew(a: Array) -> Array:
     """Matrix with skew(a) @ b = a x b."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

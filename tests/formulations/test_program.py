@@ -32,6 +32,7 @@ from tests.formulations.reference import (
     bounds_at,
     damped_inverse,
     evaluator,
+    last_command,
     null_projector,
     rows_at,
 )
@@ -239,8 +240,12 @@ def test_constant_entries_do_not_change() -> None:
         step = evaluator("ur5e", name, "fix-orientation")
         rng = np.random.default_rng(0)
         one, two = (
-            step(q=ROBOT.random_configuration(rng), v=rng.normal(size=3), v_fixed=rng.normal(size=3)) for _ in range(2)
-        )
+            step(
+                q=ROBOT.random_configuration(rng), v=rng.normal(size=3), v_fixed=rng.normal(size=3),
+                **last_command(step, rng),
+            )
+            for _ in range(2)
+        )  # fmt: skip
         for key in ("H", "g", "A", "b", "C", "l", "u", "lb", "ub"):
             constant = step.lowered.constant[key].reshape(getattr(one.qp, key).shape)
             np.testing.assert_array_equal(getattr(one.qp, key)[constant], getattr(two.qp, key)[constant])
@@ -370,14 +375,21 @@ def test_a_formulation_in_a_few_lines_works_end_to_end() -> None:
 
 
 def test_registry() -> None:
-    assert available_formulations() == ("cartesian-error", "joint-space")
+    assert available_formulations() == (
+        "cartesian-error",
+        "cartesian-error-acceleration",
+        "joint-space",
+        "joint-space-acceleration",
+        "minimum-acceleration-norm",
+        "minimum-torque-norm",
+    )
     assert get_formulation("cartesian-error") == CartesianError()
     assert get_formulation("joint-space", bounds="thesis") == JointSpace("thesis")
     assert get_formulation("joint-space(bounds=thesis)") == JointSpace("thesis")
     assert get_formulation("tests.formulations.test_program:DampedLeastSquares").name == "damped-least-squares"
     instance = DampedLeastSquares()
     assert get_formulation(instance) is instance
-    with pytest.raises(PluginError, match="'nope' does not exist; the choices are cartesian-error, joint-space"):
+    with pytest.raises(PluginError, match="'nope' does not exist; the choices are cartesian-error, "):
         get_formulation("nope")
     with pytest.raises(PluginError, match="expected no options with an instance, got bounds"):
         get_formulation(instance, bounds="thesis")
@@ -457,9 +469,10 @@ def test_matrices_come_out_as_declared(name: str) -> None:
     q = adversarial_state(arm("lbr_med14"), np.random.default_rng(7))
     v = np.array([0.1, -0.2, 0.3, 0.4])
     function = step.lowered.function
-    values = {given.name: given.default for given in step.lowered.inputs} | {"q": q, "v": v}
+    last = last_command(step, np.random.default_rng(8))
+    values = {given.name: given.default for given in step.lowered.inputs} | {"q": q, "v": v} | last
     out = function(**values)
-    instance = step(q=q, v=v)
+    instance = step(q=q, v=v, **last)
     for key in ("H", "g", "A", "b", "C", "l", "u", "lb", "ub", "x_feasible"):
         np.testing.assert_array_equal(
             np.array(out[key]).reshape(getattr(instance.qp, key).shape), getattr(instance.qp, key)
