@@ -7,13 +7,29 @@ from typing import Final
 from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
+from .damped import Damped
 from .joint_space import JointSpace
+from .joint_space_weighted import JointSpaceWeighted
+from .minimum_kinetic_energy import MinimumKineticEnergy
+from .minimum_velocity_norm import MinimumVelocityNorm
+from .task_scaling import TaskScaling
 
 _REGISTRY: Final = Registry(
     "formulation",
     "kinqp.formulations",
     Formulation,  # type: ignore[type-abstract]  # only instances of it are made and checked
-    {cls.name: cls for cls in (CartesianError, JointSpace)},
+    {
+        cls.name: cls
+        for cls in (
+            CartesianError,
+            Damped,
+            JointSpace,
+            JointSpaceWeighted,
+            MinimumKineticEnergy,
+            MinimumVelocityNorm,
+            TaskScaling,
+        )
+    },
 )
 
 
