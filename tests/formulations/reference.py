@@ -39,6 +39,11 @@ def evaluator(robot: str, formulation: str | Formulation, mode: str) -> Evaluato
     return Evaluator(lower(get_formulation(formulation), arm(robot), Mode.parse(mode)))
 
 
+def needs_masses(formulation: str, robot: Robot) -> bool:
+    """Whether a formulation is refused for the robot because its masses are unknown."""
+    return formulation == "minimum-kinetic-energy" and not robot.has_inertia
+
+
 def skew(a: Array) -> Array:
     """Matrix with skew(a) @ b = a x b."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])

@@ -370,14 +370,24 @@ def test_a_formulation_in_a_few_lines_works_end_to_end() -> None:
 
 
 def test_registry() -> None:
-    assert available_formulations() == ("cartesian-error", "joint-space")
+    assert available_formulations() == (
+        "cartesian-error",
+        "damped",
+        "joint-space",
+        "joint-space-weighted",
+        "minimum-kinetic-energy",
+        "minimum-velocity-norm",
+        "task-scaling",
+    )
     assert get_formulation("cartesian-error") == CartesianError()
     assert get_formulation("joint-space", bounds="thesis") == JointSpace("thesis")
     assert get_formulation("joint-space(bounds=thesis)") == JointSpace("thesis")
     assert get_formulation("tests.formulations.test_program:DampedLeastSquares").name == "damped-least-squares"
     instance = DampedLeastSquares()
     assert get_formulation(instance) is instance
-    with pytest.raises(PluginError, match="'nope' does not exist; the choices are cartesian-error, joint-space"):
+    with pytest.raises(
+        PluginError, match="'nope' does not exist; the choices are cartesian-error, damped, joint-space"
+    ):
         get_formulation("nope")
     with pytest.raises(PluginError, match="expected no options with an instance, got bounds"):
         get_formulation(instance, bounds="thesis")
