@@ -41,7 +41,7 @@ class JointSpaceWeighted(Formulation):
     Eq. 3.6 asks whether the joint moved towards its limit in the last tick. Here the question is put to the command
     itself, by splitting it into its two directions (at the minimum one of the two is zero): a function of the state
     alone, and continuous. Asked of the last command, the weights jump with its sign, and joints with them: the tests
-    have a run in which that takes forty times the joints' acceleration limit. w_max keeps the weights finite, since the
+    have a run in which that takes 17 times the joints' acceleration limit. w_max keeps the weights finite, since the
     task is no equality here: where self-motion runs out, the share joint_weight w_max / sigma^2 of the hand's speed is
     lost, not all of it.
 

@@ -20,13 +20,13 @@ SPEEDS = (1e-6, 0.01, 0.2, 2.0)
 # dependent, and the thesis's solver fails wherever active rows are. Both are refused, which is what is tested; that the
 # share doesn't fall is what this table is for.
 LEAST_SOLVED = {"thesis-active-set": 0.25, "clarabel": 0.8, "piqp": 0.75, "casadi-qrqp": 0.75, "active-set": 0.99}
-# Where the task is an equality too, rows are dependent at every singularity, q = 0 among them, not at the locked rows' alone.
+# Where the task is an equality too, rows are dependent at every singularity, not at those of the locked rows alone.
 # Split into two directions, a joint at rest is on both of their bounds at once.
 LEAST_SOLVED_BY_FORMULATION = {
     ("minimum-kinetic-energy", "casadi-qrqp"): 0.6,
     ("minimum-velocity-norm", "casadi-qrqp"): 0.6,
     ("task-scaling", "casadi-qrqp"): 0.6,
-    ("joint-space-weighted", "thesis-active-set"): 0.0,
+    ("joint-space-weighted", "thesis-active-set"): 0.05,
 }
 
 
