@@ -23,7 +23,7 @@ from ..benchmarks import (
     sweep_table,
 )
 from ..codegen import ExportError, export_c
-from ..formulations import MODE_NAMES, ModeError, available_formulations, get_formulation
+from ..formulations import MODE_NAMES, DeclarationError, ModeError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
@@ -34,6 +34,7 @@ from .interrupt import interruptible
 USER_ERRORS = (
     CompilerError,
     ConfigError,
+    DeclarationError,
     ExportError,
     ModeError,
     OptionError,

@@ -6,6 +6,8 @@ from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
 from .damped import DEFAULT_DAMPING, Damped
 from .evaluator import Evaluator, Instance
+from .hierarchical import Hierarchical
+from .hierarchy import ABOVE, Hierarchy, command_above, levels_of
 from .inputs import InputError, check_input
 from .inverse import factor_fixed_rows, robust_inverse
 from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
@@ -21,6 +23,7 @@ from .task_scaling import TaskScaling
 from .tick import DEFAULT_DT, Input, Tick
 
 __all__ = [
+    "ABOVE",
     "BOUNDS",
     "DATA",
     "DEFAULT_DAMPING",
@@ -32,6 +35,8 @@ __all__ = [
     "DeclarationError",
     "Evaluator",
     "Formulation",
+    "Hierarchical",
+    "Hierarchy",
     "Input",
     "InputError",
     "Instance",
@@ -49,9 +54,11 @@ __all__ = [
     "Tick",
     "available_formulations",
     "check_input",
+    "command_above",
     "factor_fixed_rows",
     "factor_of_positive",
     "get_formulation",
+    "levels_of",
     "limit_gradient",
     "lower",
     "robust_inverse",

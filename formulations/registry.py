@@ -8,6 +8,7 @@ from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
 from .damped import Damped
+from .hierarchical import Hierarchical
 from .joint_space import JointSpace
 from .joint_space_weighted import JointSpaceWeighted
 from .minimum_kinetic_energy import MinimumKineticEnergy
@@ -23,6 +24,7 @@ _REGISTRY: Final = Registry(
         for cls in (
             CartesianError,
             Damped,
+            Hierarchical,
             JointSpace,
             JointSpaceWeighted,
             MinimumKineticEnergy,

@@ -202,8 +202,9 @@ static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_
     int met = 0; /* passes that met the tolerance, but without margin */
     core.warm = o->warm;
     for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
-        /* The target is T'g: what little of a large gradient the equalities leave is exact to rounding of the whole. */
-        core.scale = fmax(recentre(k, m, shift), KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
+        core.scale = recentre(k, m, shift);
+        /* The target is T'grad: what little of a large gradient the equalities leave is exact to rounding of the whole. */
+        core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
         core.max_iterations = o->max_iterations - s->iterations;
         const kinqp_status status =
             kinqp_as_solve(&k->state, k->M, k->lo, k->hi, k->centre, NULL, &core, k->w, k->rowz, k->sign, &result);

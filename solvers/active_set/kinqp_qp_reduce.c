@@ -5,6 +5,7 @@
 #include "kinqp_qp_internal.h"
 
 #define KINQP_CONSISTENCY 1e-9 /* a dependent row may miss its bound by this, relative to its terms [-] */
+#define KINQP_ROUNDING 1e-20    /* a diagonal of the Hessian below this, relative to the largest, is taken for none [-] */
 
 static int finite_all(const double *a, int count) {
     int ok = 1;
@@ -23,12 +24,14 @@ static int check_bounds(const double *l, const double *u, int count) {
     return crossed;
 }
 
-/* Scales of the variables: unit Hessian diagonal; where that is zero, unit columns. */
+/* Scales of the variables: unit Hessian diagonal; where that is zero or rounding, unit columns. */
 static void scale_variables(kinqp_qp_work *k, const kinqp_qp *qp) {
+    double steepest = 0.0;
+    for (int j = 0; j < k->n; ++j) steepest = fmax(steepest, qp->H[j * k->n + j]);
     for (int j = 0; j < k->n; ++j) {
         double largest = 0.0;
         const double diagonal = qp->H[j * k->n + j];
-        if (diagonal > 0.0) {
+        if (diagonal > KINQP_ROUNDING * steepest) {
             k->scale[j] = kinqp_qp_power(sqrt(diagonal));
             continue;
         }

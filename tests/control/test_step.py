@@ -21,8 +21,10 @@ SPEEDS = (1e-6, 0.01, 0.2, 2.0)
 # share doesn't fall is what this table is for.
 LEAST_SOLVED = {"thesis-active-set": 0.25, "clarabel": 0.8, "piqp": 0.75, "casadi-qrqp": 0.75, "active-set": 0.99}
 # Where the task is an equality too, rows are dependent at every singularity, not at those of the locked rows alone.
+# The upper level of a hierarchy is flat besides.
 # Split into two directions, a joint at rest is on both of their bounds at once.
 LEAST_SOLVED_BY_FORMULATION = {
+    ("hierarchical", "casadi-qrqp"): 0.05,
     ("minimum-kinetic-energy", "casadi-qrqp"): 0.6,
     ("minimum-velocity-norm", "casadi-qrqp"): 0.6,
     ("task-scaling", "casadi-qrqp"): 0.6,

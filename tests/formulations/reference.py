@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinqp.formulations import Evaluator, Formulation, Mode, get_formulation, lower
+from kinqp.formulations import (
+    Evaluator,
+    Formulation,
+    Hierarchy,
+    Mode,
+    available_formulations,
+    get_formulation,
+    lower,
+)
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
@@ -31,6 +39,10 @@ MODES = (
 )
 DT = 1e-3
 THRESHOLD, DAMPING_MAX = 0.08, 0.05
+
+
+# Those that are one QP, not a cascade of several.
+ONE_QP = tuple(name for name in available_formulations() if not isinstance(get_formulation(name), Hierarchy))
 
 
 @functools.cache

@@ -16,17 +16,16 @@ from kinqp.formulations import (
     InputError,
     Instance,
     Mode,
-    available_formulations,
     lower,
 )
 from kinqp.solvers import get_solver, solve
-from tests.formulations.reference import MODES, adversarial_state, bounds_at, evaluator, needs_masses
+from tests.formulations.reference import MODES, ONE_QP, adversarial_state, bounds_at, evaluator, needs_masses
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
     from kinqp.formulations import QuadraticProgram, Tick
 
-FORMULATIONS = available_formulations()
+FORMULATIONS = ONE_QP
 # Those without rows besides the joints' that are active where nothing is held back (a scale that is 1, a direction that
 # is not taken).
 LIMITS_ONLY = ("cartesian-error", "damped", "joint-space")
