@@ -33,8 +33,9 @@ class Hierarchical(Hierarchy):
     satisfies without rounding, so that no level makes the next one infeasible.
 
     It is what `joint-space` tends to as its joint weight goes to zero, without that weight's share of the task and
-    without flat QPs: the task level has many minimisers, and the posture level picks one. As there, nothing protects
-    from singularities. Solved by `kinqp.control.make_step`; not generated as C.
+    its flat QPs' loss of digits: the task level has many minimisers, and the posture level picks one. Nothing protects
+    from singularities: pulled outwards at the stretched arm the LBR's joints chatter between their bounds. Solved by
+    `kinqp.control.make_step`; not generated as C.
 
     Run-time parameters
     -------------------

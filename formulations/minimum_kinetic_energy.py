@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import casadi as ca
 
 from .algebra import factor_of_positive, matmul
 from .base import Formulation
-from .task_scale import Task, check_task, damping_threshold, follow_exactly, follow_scaled
+from .task_scale import Task, check_task, follow_exactly, follow_scaled, scale_threshold
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
     from .tick import Tick
+
+# In the norm of the inertia light wrists hardly count; with this, as much speed is lost over the LBR's workspace as
+# `minimum-velocity-norm` loses with its 0.08, and a pull at the stretched arm asks for no more acceleration.
+DEFAULT_SCALE_THRESHOLD: Final = 0.25
 
 
 @dataclass(frozen=True)
@@ -39,9 +43,9 @@ class MinimumKineticEnergy(Formulation):
 
     Run-time parameters
     -------------------
-    damping_threshold : shape ()
-        sigma_0 [m or rad], 0.08 unless told otherwise: below it, singular values cost speed; of J in the norm of
-        M over its mean.
+    scale_threshold : shape ()
+        sigma_0 [m or rad], 0.25 unless told otherwise: the smallest singular value without loss of speed, of J in the
+        norm of M over its mean.
     """
 
     task: Task = "scaled"
@@ -61,7 +65,7 @@ class MinimumKineticEnergy(Formulation):
         if self.task == "hard":
             follow_exactly(qp, tick, qd)
         else:
-            follow_scaled(qp, tick, qd, damping_threshold(tick))
+            follow_scaled(qp, tick, qd, scale_threshold(tick, DEFAULT_SCALE_THRESHOLD))
             qp.feasible(qd=tick.qd_fixed)
         qp.equal(tick.J_fixed @ qd, tick.v_fixed, name="mode")
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")

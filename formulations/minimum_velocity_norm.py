@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 from .base import Formulation
-from .task_scale import Task, check_task, damping_threshold, follow_exactly, follow_scaled
+from .task_scale import Task, check_task, follow_exactly, follow_scaled, scale_threshold
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
     from .tick import Tick
+
+DEFAULT_SCALE_THRESHOLD: Final = 0.08
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,9 @@ class MinimumVelocityNorm(Formulation):
     -------------------
     joint_weight : shape (nv,)
         W_q's diagonal, 1 unless told otherwise.
-    damping_threshold : shape ()
-        sigma_0 [m or rad], 0.08 unless told otherwise: the smallest singular value without loss of speed.
+    scale_threshold : shape ()
+        sigma_0 [m or rad], unless told otherwise 0.08, as for the damped inverse: the smallest singular value without
+        loss of speed.
     """
 
     task: Task = "scaled"
@@ -56,7 +59,7 @@ class MinimumVelocityNorm(Formulation):
         if self.task == "hard":
             follow_exactly(qp, tick, qd)
         else:
-            follow_scaled(qp, tick, qd, damping_threshold(tick))
+            follow_scaled(qp, tick, qd, scale_threshold(tick, DEFAULT_SCALE_THRESHOLD))
             qp.feasible(qd=tick.qd_fixed)
         qp.equal(tick.J_fixed @ qd, tick.v_fixed, name="mode")
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")

@@ -16,7 +16,6 @@ Task = Literal["scaled", "hard"]
 TASKS: Final[tuple[str, ...]] = get_args(Task)
 # Only keeps the direction of a zero velocity finite: far below any speed, far above where squares underflow.
 _NO_SPEED: Final = 1e-100
-DEFAULT_DAMPING_THRESHOLD: Final = 0.08
 
 
 def check_task(task: str) -> None:
@@ -25,9 +24,9 @@ def check_task(task: str) -> None:
         raise ValueError(f"task: expected one of {', '.join(TASKS)}, got {task!r}")
 
 
-def damping_threshold(tick: Tick) -> ca.SX:
-    """Return the run-time parameter `damping_threshold`, with the default and the meaning it has in `tick.inverse`."""
-    return tick.parameter("damping_threshold", DEFAULT_DAMPING_THRESHOLD, lowest=0.0, positive=True, unit="m or rad")
+def scale_threshold(tick: Tick, default: float) -> ca.SX:
+    """Return the run-time parameter `scale_threshold`, the sigma_0 of `follow_scaled`, shape (1, 1) [m or rad]."""
+    return tick.parameter("scale_threshold", default, lowest=0.0, positive=True, unit="m or rad")
 
 
 def follow_exactly(qp: QuadraticProgram, tick: Tick, qd: ca.SX) -> None:

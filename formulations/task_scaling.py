@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from .base import Formulation
-from .task_scale import follow_scaled
+from .task_scale import follow_scaled, scale_threshold
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
     from .tick import Tick
 
-DEFAULT_SCALE_THRESHOLD: Final = 3e-3
+# With 0.003 the scale is the largest possible somewhat closer to singularities (over the LBR's workspace 0.02 % more
+# speed), but pulled outwards at the stretched arm it chatters at 2,500 sign changes of acceleration a second, and with
+# 0.01 not at all.
+DEFAULT_SCALE_THRESHOLD: Final = 0.01
 
 
 @dataclass(frozen=True)
@@ -29,16 +32,15 @@ class TaskScaling(Formulation):
     slowed down, its direction kept. As one QP: the scale's exact penalty of
     `kinqp.formulations.task_scale.follow_scaled` with a small sigma_0, below which alone the two aims are traded.
 
-    At a singularity joint speeds rise to their bounds; `minimum-velocity-norm` is the same problem with a sigma_0 that
-    slows down before. The smaller sigma_0, the more digits the QP loses: compiled, a few in 100,000 ticks, of hands
-    faster than 1.5 m/s (500 sigma_0), are refused as inaccurate.
+    At a singularity joint speeds rise to their bounds, without regard to accelerations: `minimum-velocity-norm` is the
+    same problem with a sigma_0 that slows down before.
 
     Run-time parameters
     -------------------
     joint_weight : shape (nv,)
         W_q's diagonal, 1 unless told otherwise.
     scale_threshold : shape ()
-        sigma_0 [m or rad], `DEFAULT_SCALE_THRESHOLD` unless told otherwise.
+        sigma_0 [m or rad], 0.01 unless told otherwise.
     """
 
     name: ClassVar[str] = "task-scaling"
@@ -47,11 +49,8 @@ class TaskScaling(Formulation):
         """State the problem of one control cycle."""
         qd = qp.variable("qd", tick.nv)
         weight = tick.parameter("joint_weight", 1.0, size=tick.nv, lowest=0.0, positive=True)
-        threshold = tick.parameter(
-            "scale_threshold", DEFAULT_SCALE_THRESHOLD, lowest=0.0, positive=True, unit="m or rad"
-        )
         qp.minimize(qd, weight=weight, name="joint speed")
-        follow_scaled(qp, tick, qd, threshold)
+        follow_scaled(qp, tick, qd, scale_threshold(tick, DEFAULT_SCALE_THRESHOLD))
         qp.equal(tick.J_fixed @ qd, tick.v_fixed, name="mode")
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")
         qp.command(qd)

@@ -20,13 +20,14 @@ from kinqp.formulations import (
 )
 from kinqp.robots import Robot, RobotError
 from kinqp.solvers import Status
-from tests.formulations.reference import THRESHOLD, adversarial_state, bounds_at, rows_at
+from tests.formulations.reference import adversarial_state, bounds_at, rows_at
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
     from tests.formulations.reference import Array
 
 SCALED = ("minimum-velocity-norm", "minimum-kinetic-energy", "task-scaling")
+SIGMA_0 = {"minimum-velocity-norm": 0.08, "minimum-kinetic-energy": 0.25, "task-scaling": 0.01}
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
 # Nothing but the task holds these back.
 NO_LIMITS = {"q_min": -np.inf, "q_max": np.inf, "qd_max": 1e3}
@@ -56,7 +57,7 @@ def norm_of(formulation: str, robot: Robot, q: Array) -> Array:
 def test_unhindered_it_is_the_weighted_inverse(formulation: str, name: str) -> None:
     """W^-1 J' (J W^-1 J')^-1 v (eq. 3.5), scaled by min(1, 2 sigma^2/(sigma^2 + sigma_0^2))."""
     robot, rng = arm(name), np.random.default_rng(1)
-    sigma_0 = 3e-3 if formulation == "task-scaling" else THRESHOLD
+    sigma_0 = SIGMA_0[formulation]
     scales = []
     for text in MODES:
         mode = Mode.parse(text)
@@ -104,7 +105,7 @@ def test_at_a_singularity_it_slows_down(formulation: str) -> None:
     """Towards the stretched arm, pulled outwards: the speed fades out, and joints obey |qd| <= |v| / sigma_0."""
     robot = arm("lbr_med14")
     step = make_step(robot, formulation, "position")
-    sigma_0 = 3e-3 if formulation == "task-scaling" else THRESHOLD
+    sigma_0 = SIGMA_0[formulation]
     scales, speeds = [], []
     for bend in (0.5, 0.1, 0.03, 0.01, 1e-3, 1e-6, 0.0):
         q = np.array([0.0, 0.6, 0.0, -bend, 0.0, bend, 0.0])
@@ -143,7 +144,7 @@ def test_task_scaling_finds_the_largest_scale(mode: str) -> None:
             q[some] = np.where(rng.random(3) < 0.5, robot.q_min[some], robot.q_max[some])
         v = rng.normal(size=read.m_free) * rng.choice([0.05, 0.3, 1.0])
         J, _ = stacked(robot, read, q, v)
-        if np.linalg.svd(J, compute_uv=False)[-1] < 0.02:
+        if np.linalg.svd(J, compute_uv=False)[-1] < 0.05:
             continue
         scale = scale_of(step(q, v).eps, v)
         assert scale == pytest.approx(largest_scale(robot, read, q, v), abs=1e-6)
