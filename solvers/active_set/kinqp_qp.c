@@ -203,7 +203,7 @@ static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_
     core.warm = o->warm;
     for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
         core.scale = recentre(k, m, shift);
-        /* The target is T'grad: what little of a large gradient the equalities leave is exact to rounding of the whole. */
+        /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
         core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
         core.max_iterations = o->max_iterations - s->iterations;
         const kinqp_status status =

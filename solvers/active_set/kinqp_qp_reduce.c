@@ -5,7 +5,7 @@
 #include "kinqp_qp_internal.h"
 
 #define KINQP_CONSISTENCY 1e-9 /* a dependent row may miss its bound by this, relative to its terms [-] */
-#define KINQP_ROUNDING 1e-20    /* a diagonal of the Hessian below this, relative to the largest, is taken for none [-] */
+#define KINQP_NO_CURVATURE 1e-10 /* a root of curvature over its column below this, beside the largest, is none [-] */
 
 static int finite_all(const double *a, int count) {
     int ok = 1;
@@ -24,20 +24,25 @@ static int check_bounds(const double *l, const double *u, int count) {
     return crossed;
 }
 
-/* Scales of the variables: unit Hessian diagonal; where that is zero or rounding, unit columns. */
+static double largest_in_column(const kinqp_qp *qp, int j) {
+    double largest = 0.0;
+    for (int i = 0; i < qp->p; ++i) largest = fmax(largest, fabs(qp->A[i * qp->n + j]));
+    for (int i = 0; i < qp->m; ++i) largest = fmax(largest, fabs(qp->C[i * qp->n + j]));
+    return largest;
+}
+
+/* Scales of the variables: unit Hessian diagonal; unit columns of the rows where that is zero, or, measured by these
+ * columns, so small beside the others' that it says nothing of the variable's unit. */
 static void scale_variables(kinqp_qp_work *k, const kinqp_qp *qp) {
     double steepest = 0.0;
-    for (int j = 0; j < k->n; ++j) steepest = fmax(steepest, qp->H[j * k->n + j]);
     for (int j = 0; j < k->n; ++j) {
-        double largest = 0.0;
-        const double diagonal = qp->H[j * k->n + j];
-        if (diagonal > KINQP_ROUNDING * steepest) {
-            k->scale[j] = kinqp_qp_power(sqrt(diagonal));
-            continue;
-        }
-        for (int i = 0; i < qp->p; ++i) largest = fmax(largest, fabs(qp->A[i * k->n + j]));
-        for (int i = 0; i < qp->m; ++i) largest = fmax(largest, fabs(qp->C[i * k->n + j]));
-        k->scale[j] = kinqp_qp_power(largest);
+        const double diagonal = qp->H[j * k->n + j], column = largest_in_column(qp, j);
+        if (diagonal > 0.0 && column > 0.0) steepest = fmax(steepest, sqrt(diagonal) / column);
+    }
+    for (int j = 0; j < k->n; ++j) {
+        const double diagonal = qp->H[j * k->n + j], column = largest_in_column(qp, j);
+        const int curved = diagonal > 0.0 && (column == 0.0 || sqrt(diagonal) > KINQP_NO_CURVATURE * steepest * column);
+        k->scale[j] = kinqp_qp_power(curved ? sqrt(diagonal) : column);
     }
 }
 
