@@ -5,7 +5,7 @@
 #include "kinqp_qp_internal.h"
 
 #define KINQP_CONSISTENCY 1e-9 /* a dependent row may miss its bound by this, relative to its terms [-] */
-#define KINQP_NO_CURVATURE 1e-10 /* a root of curvature over its column below this, beside the largest, is none [-] */
+#define KINQP_NO_CURVATURE 1e-10 /* a root of curvature below this, beside the largest, is none [-] */
 
 static int finite_all(const double *a, int count) {
     int ok = 1;
@@ -31,18 +31,19 @@ static double largest_in_column(const kinqp_qp *qp, int j) {
     return largest;
 }
 
-/* Scales of the variables: unit Hessian diagonal; unit columns of the rows where that is zero, or, measured by these
- * columns, so small beside the others' that it says nothing of the variable's unit. */
+/* Scales of the variables: unit Hessian diagonal; unit columns of the rows where that is zero, or so small beside the
+ * others', both as it stands and measured by these columns, that it says nothing of the variable's unit. */
 static void scale_variables(kinqp_qp_work *k, const kinqp_qp *qp) {
-    double steepest = 0.0;
+    double largest = 0.0, steepest = 0.0;
     for (int j = 0; j < k->n; ++j) {
-        const double diagonal = qp->H[j * k->n + j], column = largest_in_column(qp, j);
-        if (diagonal > 0.0 && column > 0.0) steepest = fmax(steepest, sqrt(diagonal) / column);
+        const double root = sqrt(fmax(qp->H[j * k->n + j], 0.0)), column = largest_in_column(qp, j);
+        largest = fmax(largest, root);
+        if (column > 0.0) steepest = fmax(steepest, root / column);
     }
     for (int j = 0; j < k->n; ++j) {
-        const double diagonal = qp->H[j * k->n + j], column = largest_in_column(qp, j);
-        const int curved = diagonal > 0.0 && (column == 0.0 || sqrt(diagonal) > KINQP_NO_CURVATURE * steepest * column);
-        k->scale[j] = kinqp_qp_power(curved ? sqrt(diagonal) : column);
+        const double root = sqrt(fmax(qp->H[j * k->n + j], 0.0)), column = largest_in_column(qp, j);
+        const int curved = root > KINQP_NO_CURVATURE * largest || root > KINQP_NO_CURVATURE * steepest * column;
+        k->scale[j] = kinqp_qp_power(curved || column == 0.0 ? root : column);
     }
 }
 
