@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..formulations import Evaluator, Mode, StepResult, get_formulation, lower
+from ..formulations import ABOVE, Evaluator, InputError, Mode, StepResult, get_formulation, levels_of, lower
 from ..solvers import Status, get_solver
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ class InterpretedStep:
     A command is sent only if the solver's answer holds: finite, within the bounds to `BOUND_TOLERANCE`, the locked
     rows exact to `FIXED_TOLERANCE` relative to the joint speed's share in them. Otherwise the command is the
     formulation's safe stop, and `status` says why: zero velocity, which no bound excludes, or the fastest admissible
-    braking (`Formulation.safe_stop`).
+    braking (`Formulation.safe_stop`). Of a hierarchy all levels are solved, in order; where one of them fails the
+    command is the safe stop too.
 
     Not to be shared between threads.
     """
@@ -43,16 +44,20 @@ class InterpretedStep:
         self.mode: Final = mode
         self.formulation: Final = formulation
         self.solver: Final = solver
-        self._evaluator: Final = Evaluator(lower(formulation, robot, mode))
+        self._levels: Final = tuple(Evaluator(lower(level, robot, mode)) for level in levels_of(formulation))
+        names = [given.name for level in self._levels for given in level.inputs]
+        # Between the levels of a hierarchy this one is handed on, not given.
+        passed_on = ABOVE if len(self._levels) > 1 else None
+        self._inputs: Final = tuple(dict.fromkeys(name for name in names if name != passed_on))
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the run-time inputs, beyond `q` and `v`, that a call takes by keyword."""
-        return tuple(i.name for i in self._evaluator.inputs if i.name not in ("q", "v"))
+        return tuple(name for name in self._inputs if name not in ("q", "v"))
 
     def evaluate(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> Instance:
-        """Give the numbers of the QP at a state, without solving it; arguments as in a call."""
-        return self._evaluator(q=q, v=v, **inputs)
+        """Give the numbers of the (first level's) QP at a state, without solving it; arguments as in a call."""
+        return self._levels[0](**self._given(self._levels[0], {"q": q, "v": v, **inputs}))
 
     def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
         """Compute the command.
@@ -71,8 +76,18 @@ class InterpretedStep:
         InputError
             Naming the input that is unknown, missing, of the wrong shape, not finite or out of range.
         """
-        instance = self._evaluator(q=q, v=v, **inputs)
-        return self._judge(instance, self.solver.solve(instance.qp))
+        given = {"q": q, "v": v, **inputs}
+        solved: list[tuple[Instance, Solution]] = []
+        active: dict[str, None] = {}  # in order, each once
+        for level in self._levels:
+            above = {ABOVE: _command(*solved[-1])} if solved else {}
+            instance = level(**self._given(level, given), **above)
+            solution = self.solver.solve(instance.qp)
+            solved.append((instance, solution))
+            if solution.status is not Status.SOLVED or not np.isfinite(_command(instance, solution)).all():
+                break
+            active |= dict.fromkeys(level.active_rows(instance.qp, solution))
+        return self._judge(solved, tuple(active))
 
     def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> list[StepResult]:
         """Compute the commands of many states, one after the other.
@@ -91,9 +106,22 @@ class InterpretedStep:
             raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
         return [self(q, v, **inputs) for q, v in zip(states, twists, strict=True)]
 
-    def _judge(self, instance: Instance, solution: Solution) -> StepResult:
+    def _given(self, level: Evaluator, inputs: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
+        """Those of the inputs that a level takes."""
+        if len(self._levels) == 1:
+            return inputs
+        for name in inputs:
+            if name not in self._inputs:
+                raise InputError(f"{name}: expected an input among {', '.join(self._inputs)}, got {name!r}")
+        taken = {given.name for given in level.inputs}
+        return {name: value for name, value in inputs.items() if name in taken}
+
+    def _judge(self, levels: list[tuple[Instance, Solution]], active: tuple[str, ...]) -> StepResult:
+        instance, solution = levels[-1]
         status, message = solution.status, solution.message
-        qd = instance.K @ solution.x + instance.k
+        if status is not Status.SOLVED and len(self._levels) > 1:
+            message = f"{self._levels[len(levels) - 1].lowered.formulation.name}: {message}"
+        qd = _command(instance, solution)
         fixed_error = bound_violation = np.inf
         if np.isfinite(qd).all():
             residual = np.abs(instance.J_fixed @ qd - instance.v_fixed)
@@ -113,15 +141,20 @@ class InterpretedStep:
             qd=command,
             eps=instance.J_free @ command - instance.v,
             status=status,
-            iterations=solution.iterations,
-            active=self._evaluator.active_rows(instance.qp, solution) if solved else (),
+            iterations=sum(each.iterations for _, each in levels),
+            active=active if solved else (),
             fixed_error=fixed_error,
             bound_violation=bound_violation,
             sigma_min=_smallest_singular_value(instance.J_bar),
-            setup_time=solution.setup_time,
-            solve_time=solution.solve_time,
+            setup_time=sum(each.setup_time for _, each in levels),
+            solve_time=sum(each.solve_time for _, each in levels),
             message=message,
         )
+
+
+def _command(instance: Instance, solution: Solution) -> Array:
+    command: Array = instance.K @ solution.x + instance.k
+    return command
 
 
 def _smallest_singular_value(matrix: Array) -> float:

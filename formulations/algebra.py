@@ -43,11 +43,15 @@ def matmul(A: ca.SX, B: ca.SX) -> ca.SX:
     return product
 
 
-def inverse_of_positive(matrix: ca.SX) -> ca.SX:
-    """Inverse of a symmetric positive definite matrix, shape (m, m), by L D L' without pivoting, unrolled.
+def factor_of_positive(matrix: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Factor a symmetric positive definite matrix, shape (m, m), into L D L' without pivoting, unrolled.
 
-    Cofactors have shorter chains for m = 3, but measured no faster, and lose all digits where two singular values
-    vanish.
+    Returns
+    -------
+    lower : ca.SX, shape (m, m)
+        L, unit lower triangular.
+    pivots, reciprocals : ca.SX, shape (m, 1)
+        Diagonal of D, and one over it.
     """
     m = matrix.size1()
     lower = ca.SX.eye(m)
@@ -62,11 +66,23 @@ def inverse_of_positive(matrix: ca.SX) -> ca.SX:
         scaled.append(column)
         for i in range(j + 1, m):
             lower[i, j] = column[i] * reciprocals[j]
+    # scaled[j][j] is the pivot of column j.
+    return lower, ca.vertcat(*(scaled[j][j] for j in range(m))), ca.vertcat(*reciprocals)
+
+
+def inverse_of_positive(matrix: ca.SX) -> ca.SX:
+    """Inverse of a symmetric positive definite matrix, shape (m, m), by L D L' without pivoting, unrolled.
+
+    Cofactors have shorter chains for m = 3, but measured no faster, and lose all digits where two singular values
+    vanish.
+    """
+    m = matrix.size1()
+    lower, _, reciprocals = factor_of_positive(matrix)
     rows = [ca.SX.eye(m)[i, :] for i in range(m)]
     for i in range(m):
         for k in range(i):
             rows[i] = rows[i] - lower[i, k] * rows[k]
-    rows = [row * reciprocal for row, reciprocal in zip(rows, reciprocals, strict=True)]
+    rows = [row * reciprocals[i] for i, row in enumerate(rows)]
     for i in reversed(range(m)):
         for k in range(i + 1, m):
             rows[i] = rows[i] - lower[k, i] * rows[k]

@@ -8,10 +8,16 @@ from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
 from .cartesian_error_acceleration import CartesianErrorAcceleration
+from .damped import Damped
+from .hierarchical import Hierarchical
 from .joint_space import JointSpace
 from .joint_space_acceleration import JointSpaceAcceleration
+from .joint_space_weighted import JointSpaceWeighted
 from .minimum_acceleration_norm import MinimumAccelerationNorm
+from .minimum_kinetic_energy import MinimumKineticEnergy
 from .minimum_torque_norm import MinimumTorqueNorm
+from .minimum_velocity_norm import MinimumVelocityNorm
+from .task_scaling import TaskScaling
 
 _REGISTRY: Final = Registry(
     "formulation",
@@ -26,6 +32,12 @@ _REGISTRY: Final = Registry(
             JointSpaceAcceleration,
             MinimumAccelerationNorm,
             MinimumTorqueNorm,
+            Damped,
+            Hierarchical,
+            JointSpaceWeighted,
+            MinimumKineticEnergy,
+            MinimumVelocityNorm,
+            TaskScaling,
         )
     },
 )

@@ -13,6 +13,7 @@
 #define KINQP_REFINEMENTS 4         /* refinements per pass at most [count] */
 #define KINQP_MARGIN 0.01           /* proximal passes aim for this share of the tolerance [-] */
 #define KINQP_MARGIN_PASSES 6       /* passes granted for that once the tolerance itself is met [count] */
+#define KINQP_GRADIENT_SHARE 0.01   /* of the gradient's length counts as length of the data [-] */
 
 kinqp_qp_options kinqp_qp_default_options(int n, int p, int m) {
     kinqp_qp_options o;
@@ -202,6 +203,8 @@ static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_
     core.warm = o->warm;
     for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
         core.scale = recentre(k, m, shift);
+        /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
+        core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
         core.max_iterations = o->max_iterations - s->iterations;
         const kinqp_status status =
             kinqp_as_solve(&k->state, k->M, k->lo, k->hi, k->centre, NULL, &core, k->w, k->rowz, k->sign, &result);

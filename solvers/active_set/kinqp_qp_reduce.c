@@ -5,6 +5,7 @@
 #include "kinqp_qp_internal.h"
 
 #define KINQP_CONSISTENCY 1e-9 /* a dependent row may miss its bound by this, relative to its terms [-] */
+#define KINQP_NO_CURVATURE 1e-10 /* a root of curvature below this, beside the largest, is none [-] */
 
 static int finite_all(const double *a, int count) {
     int ok = 1;
@@ -23,18 +24,26 @@ static int check_bounds(const double *l, const double *u, int count) {
     return crossed;
 }
 
-/* Scales of the variables: unit Hessian diagonal; where that is zero, unit columns. */
+static double largest_in_column(const kinqp_qp *qp, int j) {
+    double largest = 0.0;
+    for (int i = 0; i < qp->p; ++i) largest = fmax(largest, fabs(qp->A[i * qp->n + j]));
+    for (int i = 0; i < qp->m; ++i) largest = fmax(largest, fabs(qp->C[i * qp->n + j]));
+    return largest;
+}
+
+/* Scales of the variables: unit Hessian diagonal; unit columns of the rows where that is zero, or so small beside the
+ * others', both as it stands and measured by these columns, that it says nothing of the variable's unit. */
 static void scale_variables(kinqp_qp_work *k, const kinqp_qp *qp) {
+    double largest = 0.0, steepest = 0.0;
     for (int j = 0; j < k->n; ++j) {
-        double largest = 0.0;
-        const double diagonal = qp->H[j * k->n + j];
-        if (diagonal > 0.0) {
-            k->scale[j] = kinqp_qp_power(sqrt(diagonal));
-            continue;
-        }
-        for (int i = 0; i < qp->p; ++i) largest = fmax(largest, fabs(qp->A[i * k->n + j]));
-        for (int i = 0; i < qp->m; ++i) largest = fmax(largest, fabs(qp->C[i * k->n + j]));
-        k->scale[j] = kinqp_qp_power(largest);
+        const double root = sqrt(fmax(qp->H[j * k->n + j], 0.0)), column = largest_in_column(qp, j);
+        largest = fmax(largest, root);
+        if (column > 0.0) steepest = fmax(steepest, root / column);
+    }
+    for (int j = 0; j < k->n; ++j) {
+        const double root = sqrt(fmax(qp->H[j * k->n + j], 0.0)), column = largest_in_column(qp, j);
+        const int curved = root > KINQP_NO_CURVATURE * largest || root > KINQP_NO_CURVATURE * steepest * column;
+        k->scale[j] = kinqp_qp_power(curved || column == 0.0 ? root : column);
     }
 }
 

@@ -7,9 +7,10 @@ import pytest
 
 from kinqp.control import BOUND_TOLERANCE, InterpretedStep, make_step
 from kinqp.formulations import InputError, Mode, available_formulations, get_formulation
-from kinqp.robots import load_robot
+from kinqp.robots import RobotError, load_robot
 from kinqp.solvers import QP, RawSolution, Solver, Status, available_solvers
 from tests.control.states import states
+from tests.formulations.reference import needs_masses
 
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,1,0", "rcm:0.1")
 STATES_PER_CASE = 24
@@ -19,6 +20,16 @@ SPEEDS = (1e-6, 0.01, 0.2, 2.0)
 # dependent, and the thesis's solver fails wherever active rows are. Both are refused, which is what is tested; that the
 # share doesn't fall is what this table is for.
 LEAST_SOLVED = {"thesis-active-set": 0.25, "clarabel": 0.8, "piqp": 0.75, "casadi-qrqp": 0.75, "active-set": 0.99}
+# Where the task is an equality too, rows are dependent at every singularity, not at those of the locked rows alone.
+# The upper level of a hierarchy is flat besides.
+# Split into two directions, a joint at rest is on both of their bounds at once.
+LEAST_SOLVED_BY_FORMULATION = {
+    ("hierarchical", "casadi-qrqp"): 0.05,
+    ("minimum-kinetic-energy", "casadi-qrqp"): 0.6,
+    ("minimum-velocity-norm", "casadi-qrqp"): 0.6,
+    ("task-scaling", "casadi-qrqp"): 0.6,
+    ("joint-space-weighted", "thesis-active-set"): 0.05,
+}
 
 # Those whose command depends on its own tick alone; for the others see test_acceleration_step.py.
 FORMULATIONS = tuple(name for name in available_formulations() if get_formulation(name).safe_stop == "zero")
@@ -41,6 +52,10 @@ def test_every_command_is_safe_on_many_states(formulation: str, solver: str, rob
 
 def check_invariants(formulation: str, solver: str, robot_name: str, count: int) -> None:
     robot = load_robot(robot_name)
+    if needs_masses(formulation, robot):
+        with pytest.raises(RobotError, match="mass_matrix"):
+            make_step(robot, formulation, MODES[0], solver)
+        return
     solved: Counter[bool] = Counter()
     for text in MODES:
         mode = Mode.parse(text)
@@ -65,7 +80,8 @@ def check_invariants(formulation: str, solver: str, robot_name: str, count: int)
             share = np.abs(locked) @ np.abs(result.qd)
             assert (np.abs(locked @ result.qd) <= 2e-9 * np.maximum(share, 1.0)).all(), case
             np.testing.assert_allclose(rows[list(mode.free_rows)] @ result.qd - v, result.eps, rtol=0, atol=1e-9)
-    assert solved[True] >= LEAST_SOLVED[solver] * solved.total()
+    least = LEAST_SOLVED_BY_FORMULATION.get((formulation, solver), LEAST_SOLVED[solver])
+    assert solved[True] >= least * solved.total()
 
 
 class Stub(Solver):

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kinqp.formulations import Evaluator, Formulation, Mode, get_formulation, lower
+from kinqp.formulations import (
+    Evaluator,
+    Formulation,
+    Hierarchy,
+    Mode,
+    available_formulations,
+    get_formulation,
+    lower,
+)
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
@@ -33,6 +41,10 @@ DT = 1e-3
 THRESHOLD, DAMPING_MAX = 0.08, 0.05
 
 
+# Those that are one QP, not a cascade of several.
+ONE_QP = tuple(name for name in available_formulations() if not isinstance(get_formulation(name), Hierarchy))
+
+
 @functools.cache
 def evaluator(robot: str, formulation: str | Formulation, mode: str) -> Evaluator:
     """Return an evaluator, lowered once per test run."""
@@ -43,6 +55,11 @@ def last_command(evaluate: Evaluator, rng: np.random.Generator) -> dict[str, Arr
     """Draw a last command for a formulation that takes one, small enough to be admissible inside the limits."""
     given = {spec.name: spec.size for spec in evaluate.inputs}
     return {"qd_prev": 0.1 * rng.normal(size=given["qd_prev"])} if "qd_prev" in given else {}
+
+
+def needs_masses(formulation: str, robot: Robot) -> bool:
+    """Whether a formulation is refused for the robot because its masses are unknown."""
+    return formulation == "minimum-kinetic-energy" and not robot.has_inertia
 
 
 def skew(a: Array) -> Array:
