@@ -3,10 +3,12 @@
 from .base import Formulation
 from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
+from .cartesian_error_robust import CartesianErrorRobust
 from .evaluator import Evaluator, Instance
 from .inputs import InputError, check_input
 from .inverse import factor_fixed_rows, robust_inverse
 from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
+from .joint_space_robust import JointSpaceRobust
 from .lowering import DATA, Lowered, RowNames, lower
 from .modes import MODE_NAMES, Mode, ModeError
 from .program import DeclarationError, QuadraticProgram
@@ -21,6 +23,7 @@ __all__ = [
     "DEFAULT_JOINT_WEIGHT",
     "MODE_NAMES",
     "CartesianError",
+    "CartesianErrorRobust",
     "DeclarationError",
     "Evaluator",
     "Formulation",
@@ -28,6 +31,7 @@ __all__ = [
     "InputError",
     "Instance",
     "JointSpace",
+    "JointSpaceRobust",
     "Lowered",
     "Mode",
     "ModeError",

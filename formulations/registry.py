@@ -7,13 +7,15 @@ from typing import Final
 from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
+from .cartesian_error_robust import CartesianErrorRobust
 from .joint_space import JointSpace
+from .joint_space_robust import JointSpaceRobust
 
 _REGISTRY: Final = Registry(
     "formulation",
     "kinqp.formulations",
     Formulation,  # type: ignore[type-abstract]  # only instances of it are made and checked
-    {cls.name: cls for cls in (CartesianError, JointSpace)},
+    {cls.name: cls for cls in (CartesianError, CartesianErrorRobust, JointSpace, JointSpaceRobust)},
 )
 
 

@@ -254,6 +254,11 @@ class Tick:
     def _fixed(self) -> FixedRows:
         return factor_fixed_rows(self.J_fixed)
 
+    @property
+    def fixed(self) -> FixedRows:
+        """Orthonormal factors of the locked rows; meaningless where `m_fixed` is zero."""
+        return self._fixed
+
     @cached_property
     def J_bar(self) -> ca.SX:
         """Guided rows within the null space of the locked ones, J_free N_c, shape (m_free, nv)."""
