@@ -38,8 +38,8 @@ class CartesianErrorRobust(Formulation):
 
     within the bounds and the rate window of `joint-space-robust`, `excess` s included; damping, pull, governor and
     smoothing are those described there. Self-motion is still not used against limits, but a motion that the pull
-    brought about is not lost either: n is what J# can't reach of c, and beta takes it back where limits ask for it. Zero
-    motion, :math:`\varepsilon = -J_{free}\,c` and :math:`\beta = 0`, is feasible while `v_fixed` is zero.
+    brought about is not lost either: n is what J# can't reach of c, and beta takes it back where limits ask for it.
+    Zero motion, :math:`\varepsilon = -J_{free}\,c` and :math:`\beta = 0`, is feasible while `v_fixed` is zero.
 
     Where no limit is active, :math:`\dot q = c`, and there is nothing to iterate.
 

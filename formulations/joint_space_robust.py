@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import casadi as ca
 
+from ..solvers.options import flag
 from .base import Formulation
-from .joint_space import DEFAULT_JOINT_WEIGHT
 from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, scaled_last_command
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
     from .tick import Tick
+
+
+# Three times that of `joint-space`: with less, a joint that runs into its limit sets the self-motion swinging
+# (docs/singularities.md); it takes 0.3 % off the hand's speed where singular values are 0.3.
+ROBUST_JOINT_WEIGHT: Final = 3e-4
+_PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor")
 
 
 @dataclass(frozen=True)
@@ -29,15 +35,17 @@ class JointSpaceRobust(Formulation):
         \dot q_{lo} \le \dot q \le \dot q_{hi},\quad
         \dot q_{prev} - (1 + s)\,a\,dt \le \dot q \le \dot q_{prev} + (1 + s)\,a\,dt,\quad s \ge 0
 
-    - **Damping**, :math:`\lambda^2`, grows below `damping_threshold` as the guided rows J_bar lose rank (`damping`). It is
-      on the joint velocities, never on the locked rows, which hold exactly.
-    - **Pull**: what damping draws to is not zero but :math:`\dot q_{pull}`, up the gradient of the smallest singular
-      value in proportion to the hand's pull along the singular direction (`pull`). Damped alone, a stretched arm sticks.
+    - **Damping**, :math:`\lambda^2`, grows below `damping_threshold` as the guided rows J_bar lose rank (`damping`). It
+      is on the joint velocities, never on the locked rows, which hold exactly.
+    - **Pull**: what damping draws to is not zero but :math:`\dot q_{pull}`, up the gradient of the smallest
+      singular value in proportion to the hand's pull along the singular direction (`pull`). Damped alone, a stretched
+      arm sticks.
     - **Rate limit**: accelerations stay within `qdd_max`. Where the locked rows or the limits of position and velocity
       don't allow that, it yields, by the variable `excess` (`limit_rate`); those never do.
-    - **Smoothing**: the error of the last command, :math:`\varepsilon_{prev} = J_{free}\,\dot q_{prev} - v`, decays with the
-      time constant `smoothing_time` instead of at once, :math:`\varphi = \tau/(\tau + dt)`. The acceleration is then as
-      continuous as the QP's data, with no memory but `qd_prev`; joints approach their limits in the same way.
+    - **Smoothing**: the error of the last command, :math:`\varepsilon_{prev} = J_{free}\,\dot q_{prev} - v`, decays
+      with the time constant `smoothing_time` instead of at once, :math:`\varphi = \tau/(\tau + dt)`. The
+      acceleration is then as continuous as the QP's data, with no memory but `qd_prev`; joints approach their limits
+      in the same way.
     - **Governor**: near singularities of the locked rows the hand's speed is reduced such that these leave the joints
       enough acceleration (`governor`): v stands for its governed share throughout.
 
@@ -54,7 +62,7 @@ class JointSpaceRobust(Formulation):
     task_weight : shape (m_free,)
         W's diagonal, 1 unless told otherwise.
     joint_weight : shape (nv,)
-        W_q's diagonal, `DEFAULT_JOINT_WEIGHT` unless told otherwise.
+        W_q's diagonal, `ROBUST_JOINT_WEIGHT` unless told otherwise.
     damping_threshold, damping_max
         sigma_0 and lambda_max [m or rad], 0.1 and 0.08.
     pull_gain
@@ -76,8 +84,10 @@ class JointSpaceRobust(Formulation):
     name: ClassVar[str] = "joint-space-robust"
 
     def __post_init__(self) -> None:
-        """Refuse a pull without damping."""
+        """Read options that came as words; refuse a pull without damping."""
         super().__post_init__()
+        for option in _PARTS:
+            object.__setattr__(self, option, flag(option, getattr(self, option)))
         if self.pull and not self.damping:
             raise ValueError("pull: expected damping, which the pull takes the place of, got damping=False")
 
@@ -86,7 +96,7 @@ class JointSpaceRobust(Formulation):
         eps = qp.variable("eps", tick.m_free)
         qd = qp.variable("qd", tick.nv)
         task_weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
-        weight = tick.parameter("joint_weight", DEFAULT_JOINT_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
+        weight = tick.parameter("joint_weight", ROBUST_JOINT_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
         measured = damping(tick) if self.damping or self.governor else None
         v = tick.v * governor(tick, measured) if self.governor and measured else tick.v
         keep = kept_share(tick) if self.smoothing else ca.SX(0)

@@ -61,10 +61,12 @@ def rate_window(tick: Tick, *, gentle: bool) -> RateWindow:
         return RateWindow(low, high, step)
     keep = kept_share(tick)
     tau = tick.parameter("smoothing_time", 0.02, lowest=0.0, unit="s")
-    ahead = tick.q + tau * tick.qd_prev
+    ahead = tick.q + 1.5 * tau * tick.qd_prev
     to_low, to_high = velocity_bounds(
         tick.bounds, ahead, tick.q_min, tick.q_max, tick.qd_max, GENTLE * tick.qdd_max, tick.dt
     )
+    to_low = -ca.fmin(-to_low, ca.fmax(ahead - tick.q_min, 0) / ca.fmax(tau, tick.dt))
+    to_high = ca.fmin(to_high, ca.fmax(tick.q_max - ahead, 0) / ca.fmax(tau, tick.dt))
     return RateWindow(
         ca.fmin(high, ca.fmax(low, keep * tick.qd_prev + (1 - keep) * to_low)),
         ca.fmax(low, ca.fmin(high, keep * tick.qd_prev + (1 - keep) * to_high)),
@@ -102,7 +104,7 @@ def needed_excess(window: RateWindow, qd: ca.SX) -> ca.SX:
 
 
 def scaled_last_command(tick: Tick) -> ca.SX:
-    """N_c qd_prev scaled down to the bounds, shape (nv, 1): near the last command, and within locked rows and limits."""
+    """N_c qd_prev scaled down to the bounds, shape (nv, 1): near the last command, within locked rows and limits."""
     last = tick.fixed.project(tick.qd_prev.T).T if tick.m_fixed else tick.qd_prev
     room = ca.if_else(last > 0, tick.qd_hi, -tick.qd_lo)
     return ca.fmin(1, -largest(-room / ca.fmax(ca.fabs(last), 1e-12))) * last

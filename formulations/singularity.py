@@ -23,6 +23,8 @@ DAMPING_THRESHOLD: Final = 0.1
 DAMPING_MAX: Final = 0.08
 # Below this share of the threshold a singular direction counts as lost, and the side to leave it by is chosen.
 LOST: Final = 0.02
+# How far ahead the side is looked up [s]: the velocity of a few ticks outweighs an encoder's noise.
+AHEAD: Final = 0.1
 # |self-motion gradient| below which there is no way out worth going [1].
 FLAT: Final = 1e-2
 
@@ -88,6 +90,12 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
     along = (measured.sigma2 + 0.25 * lost2) * matmul(regular, tick.v)
     strength = ca.sqrt(dot(along, along) + 1e-16)
     u = along / strength
+    rows = ca.SX(6, 1)
+    rows[list(tick.mode.free_rows)] = u
+    if tick.m_fixed:
+        rows[list(tick.mode.fixed_rows)] = -tick.fixed.solve_transposed(matmul(tick.J_free.T, u))
+    left, right = ca.SX.sym("left", 6), ca.SX.sym("right", nv)
+    held = matmul(tick.J.T, left)
     # The right singular vector times sigma, and what takes its place where that vanishes: no two entries alike, so that
     # no symmetry of the arm makes it blind.
     w = matmul(tick.J_bar.T, u)
@@ -95,14 +103,12 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
     side = ca.SX([0.5 + (golden * (i + 1)) % 1.0 for i in range(nv)])
     if tick.m_fixed:
         side = tick.fixed.project(side.T).T
-    w = w + ca.sqrt(lost2) * ca.if_else(dot(w, side) < 0, -1, 1) * side
+    # As it will be a moment ahead: a choice once made is kept whatever the noise on q.
+    turn = ca.substitute(ca.jtimes(held, tick.q, tick.qd_prev), left, ca.densify(rows))
+    turned = dot(w + AHEAD * turn, side)
+    w = w + ca.sqrt(lost2) * ca.if_else(turned < 0, -1, 1) * side
     w = w / ca.sqrt(dot(w, w) + 1e-20)
-    rows = ca.SX(6, 1)
-    rows[list(tick.mode.free_rows)] = u
-    if tick.m_fixed:
-        rows[list(tick.mode.fixed_rows)] = -tick.fixed.solve_transposed(matmul(tick.J_free.T, u))
-    left, right = ca.SX.sym("left", 6), ca.SX.sym("right", nv)
-    gradient = ca.gradient(dot(left, matmul(tick.J, right)), tick.q)
+    gradient = ca.gradient(dot(held, right), tick.q)
     gradient = ca.substitute(gradient, ca.vertcat(left, right), ca.densify(ca.vertcat(rows, w)))
     if tick.m_fixed:
         gradient = tick.fixed.project(gradient.T).T
@@ -113,8 +119,8 @@ def governor(tick: Tick, measured: Damping) -> ca.SX:
     r"""Share of the hand's velocity, 0 to 1, at which the locked rows leave the joints enough acceleration.
 
     Keeping :math:`J_{fixed}\,\dot q = 0` while the arm moves takes the accelerations
-    :math:`-J_{fixed}^+ \dot J_{fixed} \dot q`, whatever the QP wishes, and they grow without bound where the locked rows
-    become dependent. They go with the square of the speed: it is reduced until none exceeds the share
+    :math:`-J_{fixed}^+ \dot J_{fixed} \dot q`, whatever the QP wishes, and they grow without bound where the locked
+    rows become dependent. They go with the square of the speed: it is reduced until none exceeds the share
     `governor_share` of `qdd_max`, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
     """
     share = tick.parameter("governor_share", 0.5, lowest=0.0, positive=True)

@@ -15,6 +15,7 @@ from tests.robots.arms import arm
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from kinqp.control import InterpretedStep
     from kinqp.robots import Robot
 
     Array = NDArray[np.float64]
@@ -37,6 +38,12 @@ THRESHOLD, DAMPING_MAX = 0.08, 0.05
 def evaluator(robot: str, formulation: str | Formulation, mode: str) -> Evaluator:
     """Return an evaluator, lowered once per test run."""
     return Evaluator(lower(get_formulation(formulation), arm(robot), Mode.parse(mode)))
+
+
+def memory(step: Evaluator | InterpretedStep, qd_prev: Array) -> dict[str, Array]:
+    """Give the last command to a step that takes it."""
+    names = [given if isinstance(given, str) else given.name for given in step.inputs]
+    return {"qd_prev": qd_prev} if "qd_prev" in names else {}
 
 
 def skew(a: Array) -> Array:
