@@ -103,6 +103,7 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
     side = ca.SX([0.5 + (golden * (i + 1)) % 1.0 for i in range(nv)])
     if tick.m_fixed:
         side = tick.fixed.project(side.T).T
+    side = side / ca.sqrt(dot(side, side) + 1e-20)
     # As it will be a moment ahead: a choice once made is kept whatever the noise on q.
     turn = ca.substitute(ca.jtimes(held, tick.q, tick.qd_prev), left, ca.densify(rows))
     turned = dot(w + AHEAD * turn, side)
