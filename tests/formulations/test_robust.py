@@ -199,31 +199,33 @@ def test_away_from_all_limits_it_is_a_low_pass_of_joint_space() -> None:
     np.testing.assert_allclose(qd, 0.75 * last + 0.25 * wanted, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "robot", ["lbr_med14", *(pytest.param(name, marks=pytest.mark.long) for name in ("ur5e", "panda"))]
+)
 @pytest.mark.parametrize("name", ROBUST)
 @pytest.mark.parametrize("mode", MODES)
-def test_declared_point_and_zero_motion_are_admissible(name: str, mode: str) -> None:
-    for robot in ("lbr_med14", "ur5e", "panda"):
-        rng = np.random.default_rng(6)
-        evaluate = evaluator(robot, name, mode)
-        where = evaluate.lowered.variables
-        for _ in range(25):
-            q = adversarial_state(arm(robot), rng)
-            v = rng.normal(size=Mode.parse(mode).m_free) * rng.choice([0.0, 0.2, 2.0])
-            qd_prev = arm(robot).qd_max * rng.uniform(-1.5, 1.5, arm(robot).nv) * rng.choice([0.0, 0.01, 1.0])
-            instance = evaluate(q=q, v=v, qd_prev=qd_prev)
-            qp = instance.qp
-            zero = qp.x_feasible.copy()
-            if name == "joint-space-robust":
-                zero[where["qd"]], zero[where["eps"]] = 0.0, -v
-            np.testing.assert_allclose(instance.K @ zero + instance.k, 0.0, atol=1e-9)
-            zero[where["excess"]] = np.max(np.abs(qd_prev) / (arm(robot).qdd_max * 1e-3)) + 1.0
-            for x in (qp.x_feasible, zero):
-                scale = 1e-9 * (1.0 + np.abs(x).max())
-                np.testing.assert_allclose(qp.A @ x, qp.b, atol=scale)
-                assert (qp.C @ x >= qp.l - scale).all()
-                assert (qp.C @ x <= qp.u + scale).all()
-                assert (x >= qp.lb - scale).all()
-                assert (x <= qp.ub + scale).all()
+def test_declared_point_and_zero_motion_are_admissible(robot: str, name: str, mode: str) -> None:
+    rng = np.random.default_rng(6)
+    evaluate = evaluator(robot, name, mode)
+    where = evaluate.lowered.variables
+    for _ in range(25):
+        q = adversarial_state(arm(robot), rng)
+        v = rng.normal(size=Mode.parse(mode).m_free) * rng.choice([0.0, 0.2, 2.0])
+        qd_prev = arm(robot).qd_max * rng.uniform(-1.5, 1.5, arm(robot).nv) * rng.choice([0.0, 0.01, 1.0])
+        instance = evaluate(q=q, v=v, qd_prev=qd_prev)
+        qp = instance.qp
+        zero = qp.x_feasible.copy()
+        if name == "joint-space-robust":
+            zero[where["qd"]], zero[where["eps"]] = 0.0, -v
+        np.testing.assert_allclose(instance.K @ zero + instance.k, 0.0, atol=1e-9)
+        zero[where["excess"]] = np.max(np.abs(qd_prev) / (arm(robot).qdd_max * 1e-3)) + 1.0
+        for x in (qp.x_feasible, zero):
+            scale = 1e-9 * (1.0 + np.abs(x).max())
+            np.testing.assert_allclose(qp.A @ x, qp.b, atol=scale)
+            assert (qp.C @ x >= qp.l - scale).all()
+            assert (qp.C @ x <= qp.u + scale).all()
+            assert (x >= qp.lb - scale).all()
+            assert (x <= qp.ub + scale).all()
 
 
 @pytest.mark.parametrize("name", ROBUST)
