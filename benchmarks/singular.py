@@ -254,11 +254,12 @@ def main() -> None:
     console = Console(soft_wrap=True)
     robust = ("joint-space-robust", "cartesian-error-robust")
     tables = {
-        "The sweep": singular_sweep(tuple(VARIANTS), singular_paths()),
-        "Limits and other modes": singular_sweep(("plain joint-space", *robust), hard_paths()),
-        "Disturbed": singular_sweep(robust, (*singular_paths(), *hard_paths()), DISTURBANCES),
+        "The sweep": (tuple(VARIANTS), singular_paths(), (Disturbance(),)),
+        "Limits and other modes": (("plain joint-space", *robust), hard_paths(), (Disturbance(),)),
+        "Disturbed": (robust, (*singular_paths(), *hard_paths()), DISTURBANCES),
     }
-    for title, rows in tables.items():
+    for title, arguments in tables.items():
+        rows = singular_sweep(*arguments)
         console.print(f"## {title}\n\n{to_markdown(rows)}\n", markup=False, highlight=False)
     console.print("; ".join(f"{k} {v}" for k, v in conditions().items()) + ".", markup=False, highlight=False)
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from .tick import Tick
 
 
-# Three times that of `joint-space`: with less, a joint that runs into its limit sets the self-motion swinging
-# (docs/singularities.md); it takes 0.3 % off the hand's speed where singular values are 0.3.
-ROBUST_JOINT_WEIGHT: Final = 3e-4
+# Ten times that of `joint-space`: with less, a joint that runs into its limit at speed sets the self-motion swinging
+# (docs/singularities.md). It takes 1 % off the hand's speed where singular values are 0.3, 0.4 % at 0.5.
+ROBUST_JOINT_WEIGHT: Final = 1e-3
 _PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor")
 
 

@@ -193,8 +193,8 @@ def test_away_from_all_limits_it_is_a_low_pass_of_joint_space() -> None:
         evaluator("lbr_med14", "joint-space", "fix-orientation"),
     )
     q, v = np.deg2rad([10.0, 30.0, 5.0, -60.0, -5.0, 60.0, 0.0]), np.array([0.02, 0.01, -0.03])
-    wanted = solve(plain(q=q, v=v, joint_weight=3e-4).qp).x[3:]
-    last = solve(plain(q=q, v=np.array([-0.01, 0.02, 0.0]), joint_weight=3e-4).qp).x[3:]
+    wanted = solve(plain(q=q, v=v, joint_weight=1e-3).qp).x[3:]
+    last = solve(plain(q=q, v=np.array([-0.01, 0.02, 0.0]), joint_weight=1e-3).qp).x[3:]
     qd = solve(smooth(q=q, v=v, qd_prev=last, smoothing_time=0.003).qp).x[3:]
     np.testing.assert_allclose(qd, 0.75 * last + 0.25 * wanted, atol=1e-12)
 
