@@ -251,18 +251,14 @@ class Tick:
         return self.J[list(self.mode.fixed_rows), :]
 
     @cached_property
-    def _fixed(self) -> FixedRows:
-        return factor_fixed_rows(self.J_fixed)
-
-    @property
     def fixed(self) -> FixedRows:
         """Orthonormal factors of the locked rows; meaningless where `m_fixed` is zero."""
-        return self._fixed
+        return factor_fixed_rows(self.J_fixed)
 
     @cached_property
     def J_bar(self) -> ca.SX:
         """Guided rows within the null space of the locked ones, J_free N_c, shape (m_free, nv)."""
-        return self._fixed.project(self.J_free) if self.m_fixed else self.J_free
+        return self.fixed.project(self.J_free) if self.m_fixed else self.J_free
 
     @cached_property
     def inverse(self) -> ca.SX:
@@ -274,7 +270,7 @@ class Tick:
     @cached_property
     def qd_fixed(self) -> ca.SX:
         """Smallest joint velocity that gives the locked rows `v_fixed`, shape (nv, 1) [rad/s or m/s]."""
-        return self._fixed.solve(self.v_fixed) if self.m_fixed else ca.SX(self.nv, 1)
+        return self.fixed.solve(self.v_fixed) if self.m_fixed else ca.SX(self.nv, 1)
 
     @cached_property
     def _bounds(self) -> tuple[ca.SX, ca.SX]:

@@ -85,7 +85,7 @@ def test_plain_formulations_are_not() -> None:
     assert damped.peak_acceleration < 1.0
     assert damped.lost > robust.lost + 0.5
     assert robust.lost < plain.lost + 0.4
-    assert run(VARIANTS["rate limit"], out).chatter > 1.0
+    assert run(VARIANTS["rate limit"], out).chatter > 0.3
     upright = shortened(PATHS["upright"])
     assert run("joint-space", upright).peak_speed < 1e-6
     assert run("joint-space-robust", upright).peak_speed > 0.1
@@ -128,4 +128,5 @@ def test_disturbed_they_keep_all_limits(formulation: str, disturbance: Disturban
     assert row.peak_acceleration <= 1.0 + 1e-6
     assert row.fixed_error <= 1e-9
     if disturbance.speed == 0.15 and name != "upright":
-        assert row.chatter == 0.0
+        # A smooth reversal that noise pushes over the counting threshold is one sign change in four seconds.
+        assert row.chatter <= (0.3 if disturbance.noise else 0.0)

@@ -384,7 +384,7 @@ def test_registry() -> None:
     assert get_formulation("tests.formulations.test_program:DampedLeastSquares").name == "damped-least-squares"
     instance = DampedLeastSquares()
     assert get_formulation(instance) is instance
-    with pytest.raises(PluginError, match="'nope' does not exist; the choices are cartesian-error, .*joint-space"):
+    with pytest.raises(PluginError, match=r"'nope' does not exist; the choices are cartesian-error, .*joint-space"):
         get_formulation("nope")
     with pytest.raises(PluginError, match="expected no options with an instance, got bounds"):
         get_formulation(instance, bounds="thesis")
