@@ -30,6 +30,10 @@ def check(robot: str, formulation: str, mode: str, count: int) -> None:
         scale = max(1.0, float(np.abs(wanted.qd).max()))
         # As in test_parity: near q = 0 two commands that keep a nearly dependent row equally well differ by more.
         allowed = max(TOLERANCE, 10.0 * ROW_ROUNDING / weakest_locked(step, q)) if "zero" in kind else TOLERANCE
+        if wanted.sigma_min < 1e-5:
+            # At the singularity itself the pull's direction is known to 1e-10 only (a condition of 1e6), and where the
+            # gradient is flat it is stretched a hundredfold on top; 7e-8 was seen.
+            allowed = max(allowed, 2e-7)
         assert np.abs(result.qd - wanted.qd).max() <= allowed * scale, case
         held += len(result.active) > 1
     assert held > count // 4
