@@ -27,7 +27,7 @@ _SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 _PADDED: Final = ("A", "J")
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
-_LATE: Final = ("C", "K", "start")
+_LATE: Final = ("C", "start")
 _COMMENTS: Final = {
     "q": "joint positions",
     "v": "velocity that the hand asks for, along the mode's axes",

@@ -7,6 +7,7 @@ from .base import Formulation, SafeStop
 from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
 from .cartesian_error_acceleration import CartesianErrorAcceleration
+from .cartesian_error_robust import CartesianErrorRobust
 from .cuts import Cut
 from .damped import DEFAULT_DAMPING, Damped
 from .evaluator import Evaluator, Instance
@@ -16,6 +17,7 @@ from .inputs import InputError, check_input
 from .inverse import factor_fixed_rows, robust_inverse
 from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
 from .joint_space_acceleration import JointSpaceAcceleration
+from .joint_space_robust import JointSpaceRobust
 from .joint_space_weighted import JointSpaceWeighted, limit_gradient
 from .lowering import DATA, Lowered, RowNames, lower
 from .minimum_acceleration_norm import MinimumAccelerationNorm
@@ -41,6 +43,7 @@ __all__ = [
     "MODE_NAMES",
     "CartesianError",
     "CartesianErrorAcceleration",
+    "CartesianErrorRobust",
     "Cut",
     "Damped",
     "DeclarationError",
@@ -53,6 +56,7 @@ __all__ = [
     "Instance",
     "JointSpace",
     "JointSpaceAcceleration",
+    "JointSpaceRobust",
     "JointSpaceWeighted",
     "Lowered",
     "MinimumAccelerationNorm",

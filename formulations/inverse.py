@@ -56,6 +56,18 @@ class FixedRows:
             along.append(rest * reciprocal)
         return matmul(self.basis.T, ca.vertcat(*along))
 
+    def solve_transposed(self, direction: ca.SX) -> ca.SX:
+        """Combination z, shape (m_fixed, 1), of the locked rows that makes up `direction`, (nv, 1), as far as it can.
+
+        z' J_fixed = `direction`' J_fixed^+ J_fixed; the entries of dropped rows are zero.
+        """
+        along = matmul(self.basis, direction)
+        m = along.size1()
+        z = ca.SX(m, 1)
+        for i in reversed(range(m)):
+            z[i] = (along[i] - balanced_sum([self.lower[j, i] * z[j] for j in range(i + 1, m)])) * self.reciprocals[i]
+        return z
+
 
 def factor_fixed_rows(J_fixed: ca.SX) -> FixedRows:
     """Orthonormalise the locked rows by Gram-Schmidt, each row twice, dropping dependent ones.

@@ -8,10 +8,12 @@ from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
 from .cartesian_error_acceleration import CartesianErrorAcceleration
+from .cartesian_error_robust import CartesianErrorRobust
 from .damped import Damped
 from .hierarchical import Hierarchical
 from .joint_space import JointSpace
 from .joint_space_acceleration import JointSpaceAcceleration
+from .joint_space_robust import JointSpaceRobust
 from .joint_space_weighted import JointSpaceWeighted
 from .minimum_acceleration_norm import MinimumAccelerationNorm
 from .minimum_kinetic_energy import MinimumKineticEnergy
@@ -28,14 +30,16 @@ _REGISTRY: Final = Registry(
         for cls in (
             CartesianError,
             CartesianErrorAcceleration,
-            JointSpace,
-            JointSpaceAcceleration,
-            MinimumAccelerationNorm,
-            MinimumTorqueNorm,
+            CartesianErrorRobust,
             Damped,
             Hierarchical,
+            JointSpace,
+            JointSpaceAcceleration,
+            JointSpaceRobust,
             JointSpaceWeighted,
+            MinimumAccelerationNorm,
             MinimumKineticEnergy,
+            MinimumTorqueNorm,
             MinimumVelocityNorm,
             TaskScaling,
         )

@@ -267,7 +267,8 @@ class Tick:
         return self.J[list(self.mode.fixed_rows), :]
 
     @cached_property
-    def _fixed(self) -> FixedRows:
+    def fixed(self) -> FixedRows:
+        """Orthonormal factors of the locked rows; meaningless where `m_fixed` is zero."""
         return factor_fixed_rows(self.J_fixed)
 
     @cached_property
@@ -275,8 +276,8 @@ class Tick:
         """`J_bar`, `qd_fixed` and `v_left`, which share the factors of the locked rows."""
         if not self.m_fixed:
             return self.J_free, ca.SX(self.nv, 1), self.v
-        qd_fixed = self._fixed.solve(self.v_fixed)
-        formulas = (self._fixed.project(self.J_free), qd_fixed, self.v - matmul(self.J_free, qd_fixed))
+        qd_fixed = self.fixed.solve(self.v_fixed)
+        formulas = (self.fixed.project(self.J_free), qd_fixed, self.v - matmul(self.J_free, qd_fixed))
         inputs = (self.J_free, self.J_fixed, self.v_fixed, self.v)
         return self._computed("locked_rows", (self.m_free, self.m_fixed, self.nv), inputs, formulas)
 
@@ -344,7 +345,7 @@ class Tick:
     @cached_property
     def qd_prev_free(self) -> ca.SX:
         """Part of `qd_prev` that does not move the locked rows, N_c qd_prev, shape (nv, 1) [rad/s or m/s]."""
-        return self._fixed.project(self.qd_prev.T).T if self.m_fixed else self.qd_prev
+        return self.fixed.project(self.qd_prev.T).T if self.m_fixed else self.qd_prev
 
     @property
     def M(self) -> ca.SX:

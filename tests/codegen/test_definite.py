@@ -63,4 +63,4 @@ def test_flat_objectives_are_refused(made: Formulation, mode: str, tmp_path: obj
     ],
 )
 def test_others_are_not(made: Formulation, robot: str, mode: str) -> None:
-    assert step_code(arm(robot), made, [Mode.parse(mode)], "kinqp_weighted").modes[0].gradient
+    assert step_code(arm(robot), made, [Mode.parse(mode)], "kinqp_weighted").modes[0].shape.gradient

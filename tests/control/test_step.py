@@ -10,7 +10,7 @@ from kinqp.formulations import InputError, Mode, available_formulations, get_for
 from kinqp.robots import RobotError, load_robot
 from kinqp.solvers import QP, RawSolution, Solver, Status, available_solvers
 from tests.control.states import states
-from tests.formulations.reference import needs_masses
+from tests.formulations.reference import memory, needs_masses
 
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,1,0", "rcm:0.1")
 STATES_PER_CASE = 24
@@ -31,7 +31,7 @@ LEAST_SOLVED_BY_FORMULATION = {
     ("joint-space-weighted", "thesis-active-set"): 0.05,
 }
 
-# Those whose command depends on its own tick alone; for the others see test_acceleration_step.py.
+# The others stop by braking, not at once: see test_acceleration_step.py.
 FORMULATIONS = tuple(name for name in available_formulations() if get_formulation(name).safe_stop == "zero")
 
 
@@ -60,10 +60,11 @@ def check_invariants(formulation: str, solver: str, robot_name: str, count: int)
     for text in MODES:
         mode = Mode.parse(text)
         step = make_step(robot, formulation, mode, solver)
-        rng = np.random.default_rng(1)
+        rng, before = np.random.default_rng(1), np.random.default_rng(2)
         for kind, q in states(robot, count):
             v = rng.normal(size=mode.m_free) * rng.choice(SPEEDS)
-            result = step(q, v)
+            qd_prev = robot.qd_max * before.uniform(-1.0, 1.0, robot.nv) * before.choice([0.0, 0.01, 1.0])
+            result = step(q, v, **memory(step, qd_prev))
             solved[result.status is Status.SOLVED] += 1
             case = f"{text}, {kind}, q={q!r}, v={v!r}: {result.message}"
             assert np.isfinite(result.qd).all(), case
@@ -197,6 +198,7 @@ def test_drift_correction_moves_the_locked_rows() -> None:
     robot = load_robot("lbr_med14")
     drift = np.array([0.0, 0.01, -0.005])
     for name in FORMULATIONS:
-        result = make_step(robot, name, "fix-orientation", "clarabel")(Q, V, v_fixed=drift)
+        step = make_step(robot, name, "fix-orientation", "clarabel")
+        result = step(Q, V, v_fixed=drift, **memory(step, np.zeros(7)))
         assert result.status is Status.SOLVED
         np.testing.assert_allclose(robot.jacobian(Q)[3:] @ result.qd, drift, atol=1e-9)

@@ -10,6 +10,7 @@ import pytest
 
 from kinqp.benchmarks import ConfigError, load_config, make_config
 from kinqp.formulations import DEFAULT_JOINT_WEIGHT
+from kinqp.formulations.joint_space_robust import ROBUST_JOINT_WEIGHT
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -88,3 +89,14 @@ def test_links_lead_somewhere(page: Path) -> None:
     ]
     for target in targets:
         assert "://" in target or (page.parent / target).exists(), target
+
+
+def test_singularities_page_argues_for_the_defaults() -> None:
+    page = (ROOT / "docs" / "singularities.md").read_text(encoding="utf-8")
+    assert f"The joint weight** is {ROBUST_JOINT_WEIGHT:.0e}".replace("e-03", "e-3") in page
+    calm = [line.split("|") for line in page.splitlines() if "| as it is | joint-space-robust |" in line]
+    assert len(calm) == 12
+    for row in calm:
+        assert float(row[6]) <= 1.0, row
+        assert float(row[7]) == 0.0, row
+        assert float(row[9]) <= 1e-9, row

@@ -23,6 +23,7 @@ from tests.robots.arms import arm
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from kinqp.control import InterpretedStep
     from kinqp.robots import Robot
 
     Array = NDArray[np.float64]
@@ -43,6 +44,10 @@ THRESHOLD, DAMPING_MAX = 0.08, 0.05
 
 # Those that are one QP, not a cascade of several.
 ONE_QP = tuple(name for name in available_formulations() if not isinstance(get_formulation(name), Hierarchy))
+# Those among them whose command depends on its own tick alone.
+MEMORYLESS = tuple(
+    name for name in ONE_QP if get_formulation(name).safe_stop == "zero" and not name.endswith("-robust")
+)
 
 
 @functools.cache
@@ -60,6 +65,12 @@ def last_command(evaluate: Evaluator, rng: np.random.Generator) -> dict[str, Arr
 def needs_masses(formulation: str, robot: Robot) -> bool:
     """Whether a formulation is refused for the robot because its masses are unknown."""
     return formulation == "minimum-kinetic-energy" and not robot.has_inertia
+
+
+def memory(step: Evaluator | InterpretedStep, qd_prev: Array) -> dict[str, Array]:
+    """Give the last command to a step that takes it."""
+    names = [given if isinstance(given, str) else given.name for given in step.inputs]
+    return {"qd_prev": qd_prev} if "qd_prev" in names else {}
 
 
 def skew(a: Array) -> Array:

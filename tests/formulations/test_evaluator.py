@@ -16,18 +16,16 @@ from kinqp.formulations import (
     InputError,
     Instance,
     Mode,
-    get_formulation,
     lower,
 )
 from kinqp.solvers import get_solver, solve
-from tests.formulations.reference import MODES, ONE_QP, adversarial_state, bounds_at, evaluator, needs_masses
+from tests.formulations.reference import MEMORYLESS, MODES, adversarial_state, bounds_at, evaluator, needs_masses
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
     from kinqp.formulations import QuadraticProgram, Tick
 
-# Those whose command depends on its own tick alone; for the others see test_acceleration_level.py.
-FORMULATIONS = tuple(name for name in ONE_QP if get_formulation(name).safe_stop == "zero")
+FORMULATIONS = MEMORYLESS
 # Those without rows besides the joints' that are active where nothing is held back (a scale that is 1, a direction that
 # is not taken).
 LIMITS_ONLY = ("cartesian-error", "damped", "joint-space")

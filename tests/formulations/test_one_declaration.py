@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from kinqp.control import make_step
-from kinqp.formulations import Evaluator, available_formulations, get_formulation
+from kinqp.formulations import Evaluator, get_formulation
 from kinqp.solvers import Status
 from tests.codegen.compiled import compiled
 from tests.formulations.inputs import inputs_at, varied
-from tests.formulations.reference import MODES
+from tests.formulations.reference import MODES, ONE_QP
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
@@ -23,12 +23,10 @@ if TYPE_CHECKING:
 
 ARMS = ("lbr_med14", "ur5e", "panda")
 TOLERANCE = 1e-9
-ALL = [(name, robot, mode) for name in available_formulations() for robot in ARMS for mode in MODES]
+ALL = [(name, robot, mode) for name in ONE_QP for robot in ARMS for mode in MODES]
 # Per formulation each mode once, on the three arms in turn; the others in the long run.
-SOME = [
-    (name, ARMS[(i + j) % 3], mode) for i, name in enumerate(available_formulations()) for j, mode in enumerate(MODES)
-]
-FEW = [(name, ARMS[i % 3], MODES[(2 + 3 * i) % 7]) for i, name in enumerate(available_formulations())]
+SOME = [(name, ARMS[(i + j) % 3], mode) for i, name in enumerate(ONE_QP) for j, mode in enumerate(MODES)]
+FEW = [(name, ARMS[i % 3], MODES[(2 + 3 * i) % 7]) for i, name in enumerate(ONE_QP)]
 
 
 def cases(quick: list[tuple[str, str, str]]) -> list[Any]:

@@ -379,10 +379,12 @@ def test_registry() -> None:
     assert available_formulations() == (
         "cartesian-error",
         "cartesian-error-acceleration",
+        "cartesian-error-robust",
         "damped",
         "hierarchical",
         "joint-space",
         "joint-space-acceleration",
+        "joint-space-robust",
         "joint-space-weighted",
         "minimum-acceleration-norm",
         "minimum-kinetic-energy",
