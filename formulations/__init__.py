@@ -10,7 +10,7 @@ from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
 from .lowering import DATA, Lowered, RowNames, lower
 from .modes import MODE_NAMES, Mode, ModeError
 from .program import DeclarationError, QuadraticProgram
-from .registry import available_formulations, get_formulation
+from .registry import available_formulations, get_formulation, with_constraints
 from .result import StepResult
 from .tick import DEFAULT_DT, Input, Tick
 
@@ -44,4 +44,5 @@ __all__ = [
     "thesis_bound",
     "velocity_bounds",
     "viable_bound",
+    "with_constraints",
 ]

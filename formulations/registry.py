@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Final
+import re
+from typing import TYPE_CHECKING, Final
 
 from ..solvers.plugins import PluginError, Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
+from .constraints import Constrained, get_constraint
 from .joint_space import JointSpace
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .constraints import Constraint
 
 _REGISTRY: Final = Registry(
     "formulation",
@@ -15,6 +22,10 @@ _REGISTRY: Final = Registry(
     Formulation,  # type: ignore[type-abstract]  # only instances of it are made and checked
     {cls.name: cls for cls in (CartesianError, JointSpace)},
 )
+
+
+# A plus between terms, not one of an exponent within brackets.
+_BETWEEN: Final = re.compile(r"\+(?![^(]*\))")
 
 
 def available_formulations() -> tuple[str, ...]:
@@ -29,7 +40,7 @@ def get_formulation(formulation: str | Formulation, /, **options: object) -> For
     ----------
     formulation : str or Formulation
         A registered name or ``module:Name``, options in brackets behind it: "cartesian-error(bounds=thesis)"; or an
-        instance, which is returned as it is.
+        instance, which is returned as it is. Constraints may follow: "joint-space + twist-limits(frame=tool)".
     **options
         Its options, where it is given by name.
 
@@ -39,7 +50,37 @@ def get_formulation(formulation: str | Formulation, /, **options: object) -> For
         When there is none of that name, or options come with an instance.
     """
     if isinstance(formulation, str):
-        return _REGISTRY.make(formulation, **options)
+        name, *constraints = _BETWEEN.split(formulation)
+        made = _REGISTRY.make(name, **options)
+        return with_constraints(made, constraints) if constraints else made
     if options:
         raise PluginError(f"formulation: expected no options with an instance, got {', '.join(options)}")
     return formulation
+
+
+def with_constraints(formulation: str | Formulation, constraints: Sequence[str | Constraint]) -> Constrained:
+    """Put constraints on a formulation's command.
+
+    Parameters
+    ----------
+    formulation : str or Formulation
+        As for `get_formulation`.
+    constraints : sequence of str or Constraint
+        Each as for `kinqp.formulations.constraints.get_constraint`.
+
+    Returns
+    -------
+    Constrained
+        A formulation like any other: for `make_step`, `compile_step`, `export_c`, a sweep. In text it is
+        "joint-space + self-collision + twist-limits(frame=tool)".
+
+    Raises
+    ------
+    PluginError
+        When there is no formulation or constraint of a name.
+    ValueError
+        When two constraints have one name.
+    """
+    return Constrained(
+        formulation=get_formulation(formulation), constraints=tuple(get_constraint(one) for one in constraints)
+    )

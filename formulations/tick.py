@@ -224,6 +224,11 @@ class Tick:
         return self.robot.symbolic(self.q, self.qd_prev)
 
     @property
+    def kinematics(self) -> SymbolicKinematics:
+        """The arm's kinematics at `q`, world axes: of its links too, where a constraint needs more than the tool."""
+        return self._kinematics
+
+    @property
     def pose(self) -> ca.SX:
         """Pose of the tool centre point in the world, shape (4, 4) [m]."""
         return self._kinematics.pose
