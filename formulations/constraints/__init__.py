@@ -2,7 +2,7 @@
 
 from .base import Constrained, Constraint
 from .contact_force import ContactForce
-from .elbow import ElbowHold, ElbowRange
+from .elbow import ElbowBend, ElbowHold, ElbowRange
 from .gaps import APPROACHES, GapConstraint, Gaps
 from .obstacles import Obstacle, Obstacles
 from .registry import available_constraints, get_constraint
@@ -16,6 +16,7 @@ __all__ = [
     "Constrained",
     "Constraint",
     "ContactForce",
+    "ElbowBend",
     "ElbowHold",
     "ElbowRange",
     "GapConstraint",

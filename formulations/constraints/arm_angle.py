@@ -59,12 +59,18 @@ class ArmAngle:
     scale : ca.SX, shape (1, 1)
         Distance of the elbow from the line through shoulder and wrist, times the sine of the angle between that line
         and the reference direction [m]. Zero where the angle is undefined, and there the row is zero too.
+    offset : ca.SX, shape (1, 1)
+        Distance of the elbow from the line through shoulder and wrist [m].
+    offset_row : ca.SX, shape (1, nv)
+        `offset_row` @ qd is its rate.
     """
 
     sine: ca.SX
     cosine: ca.SX
     row: ca.SX
     scale: ca.SX
+    offset: ca.SX
+    offset_row: ca.SX
 
 
 def find_centres(robot: Robot) -> Centres:
@@ -145,9 +151,17 @@ def arm_angle(kinematics: SymbolicKinematics, centres: Centres, reference: ca.SX
     turn = ca.cross(line, _faded(upright))
     J_elbow, J_wrist = kinematics.point_jacobian(e_link, E), kinematics.point_jacobian(w_link, W)
     lever = dot(line, elbow) * _faded_reciprocal(wrist)
-    row = slope * (matmul(swing.T, J_elbow) - lever * matmul(swing.T, J_wrist))
+    J_side = J_elbow - lever * J_wrist  # the elbow's velocity less the line's
+    row = slope * matmul(swing.T, J_side)
     row += off_line * dot(line, reference) * _faded_reciprocal(wrist) * matmul(turn.T, J_wrist)
-    return ArmAngle(dot(ca.cross(reference, side), line), dot(reference, side), row, off_line * slope)
+    return ArmAngle(
+        sine=dot(ca.cross(reference, side), line),
+        cosine=dot(reference, side),
+        row=row,
+        scale=off_line * slope,
+        offset=off_line,
+        offset_row=matmul(_faded(side).T, J_side),
+    )
 
 
 def _faded_reciprocal(vector: ca.SX) -> ca.SX:

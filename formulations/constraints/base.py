@@ -45,6 +45,8 @@ class Constraint(ABC):
     name: str = ""
 
     kind: ClassVar[str]
+    # Above the hand, unless a subclass says otherwise: 1 m/s of Cartesian error costs as much as the whole correction.
+    default_priority: ClassVar[float] = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", self.name or self.kind)
@@ -96,12 +98,13 @@ class Constraint(ABC):
     def yielding(self, qp: QuadraticProgram, tick: Tick) -> ca.SX:
         """Declare what a correction gives way by, and return it: a scalar in [0, 1], 0 where all of it is carried out.
 
-        Its cost is 1/2 priority y^2, with the run-time parameter `priority` in the units of the task's cost: at 1,
-        giving up a whole correction costs as much as a Cartesian error of 1 m/s.
+        Its cost is 1/2 priority y^2, with the run-time parameter `priority` in the units of the task's cost, so that
+        giving up a whole correction costs as much as a Cartesian error of sqrt(priority) m/s.
         """
         label = f"{self.name} yield"
         given_up = qp.variable(label, 1)
-        qp.minimize(given_up, weight=self.parameter(tick, "priority", 1.0, unit="m^2/s^2", positive=True), name=label)
+        priority = self.parameter(tick, "priority", self.default_priority, unit="m^2/s^2", positive=True)
+        qp.minimize(given_up, weight=priority, name=label)
         qp.between(0.0, given_up, 1.0, name=label)
         if qp.feasible_values:
             # At the feasible point nothing needs to be corrected.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import casadi as ca
 import numpy as np
 
+from ...solvers.options import flag
 from ..algebra import matmul
 from .arm_angle import ArmAngle, arm_angle, find_centres
 from .base import Constraint, limited, unit_or_zero
@@ -16,6 +17,11 @@ from .gaps import GapConstraint, Gaps
 if TYPE_CHECKING:
     from ..program import QuadraticProgram
     from ..tick import Tick
+
+
+# A correction of the elbow is a matter of self-motion: giving it up costs as much as 0.03 m/s of the hand, so that it
+# goes on where self-motion is to be had, and does not push the hand about where it is not (`cartesian-error`).
+_BELOW_THE_HAND: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,18 +43,21 @@ class ElbowHold(Constraint):
     Without `correct` there is no correction and no y: the rate is zero, and drift stays as it comes.
 
     The angle is undefined where shoulder, elbow and wrist are in line (arm stretched), and where shoulder and wrist
-    are in line with the reference direction. The row goes to zero there with m: it holds nothing at the point itself,
-    and the angle that it takes up beyond is whichever the arm left with.
+    are in line with the reference direction. The row goes to zero there with m. An arm that is guided through the
+    stretched posture comes out with its angle turned by 180 deg: without `correct` that is where it is held from then
+    on, with it the elbow is swung round at `speed`. `ElbowBend` keeps the arm from getting there.
 
     Parameters
     ----------
     correct : bool
         Whether the angle is led to `<name>_angle`, and not only held.
+    angle : float, optional
+        Default of the run-time parameter [rad]; without it every call must give it.
 
     Run-time parameters
     -------------------
-    <name>_angle
-        Where the angle should be [rad], with `correct`: new at every start of guiding.
+    <name>_angle : shape (1,)
+        Where the angle should be [rad], with `correct`.
     <name>_gain, <name>_speed, <name>_priority
         Of the correction [1/s], [rad/s]: 5 and 0.2 unless told otherwise.
     <name>_reference : shape (3,)
@@ -56,8 +65,16 @@ class ElbowHold(Constraint):
     """
 
     correct: bool = False
+    angle: float | None = None
 
     kind: ClassVar[str] = "elbow-hold"
+    default_priority: ClassVar[float] = _BELOW_THE_HAND
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "correct", flag("correct", self.correct))
+        if self.angle is not None and not (self.correct and np.isfinite(self.angle)):
+            raise ValueError(f"{self.kind}, angle: expected a finite number, and correct=true, got {self.angle}")
 
     def add(self, qp: QuadraticProgram, tick: Tick) -> None:
         """Add the equality."""
@@ -66,7 +83,7 @@ class ElbowHold(Constraint):
         if not self.correct:
             qp.equal(rate, 0.0, name=self.name)
             return
-        away = _difference(angle, self.parameter(tick, "angle", None, unit="rad"))
+        away = _difference(angle, self.parameter(tick, "angle", self.angle, unit="rad"))
         gain = self.parameter(tick, "gain", 5.0, unit="1/s", not_negative=True)
         speed = self.parameter(tick, "speed", 0.2, unit="rad/s", not_negative=True)
         back = -limited(ca.fmin(gain, 1 / tick.dt) * away, speed) * angle.scale
@@ -97,6 +114,7 @@ class ElbowRange(GapConstraint):
     default_deceleration: ClassVar[float] = 5.0
     default_gain: ClassVar[float] = 5.0
     default_retreat: ClassVar[float] = 0.2
+    default_priority: ClassVar[float] = _BELOW_THE_HAND
 
     def gaps(self, tick: Tick) -> Gaps:
         """Measure what is left to either side, the upper first."""
@@ -108,6 +126,36 @@ class ElbowRange(GapConstraint):
             ca.vertcat(-angle.row, angle.row),
             ca.vertcat(angle.scale, angle.scale),
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElbowBend(GapConstraint):
+    r"""The elbow kept off the line through shoulder and wrist: the arm never stretches, its angle stays defined.
+
+    .. math:: \hat p'(J_e - \tfrac{\hat w'e}{|w|} J_w)\,\dot q \ge -b(|p| - p_{min})
+
+    with p the elbow's offset from that line. Zero motion is always feasible, see `GapConstraint`; the singularity that
+    the thesis's elbow restriction is there for (2.3.2) is then out of reach. An arm that starts stretched has a row of
+    zeros: it may bend.
+
+    Run-time parameters
+    -------------------
+    <name>_min
+        Least offset [m]; 0.05 unless told otherwise: the LBR Med 14 then stops 14 deg short of stretched.
+    """
+
+    kind: ClassVar[str] = "elbow-bend"
+    unit: ClassVar[str] = "m"
+    default_deceleration: ClassVar[float] = 2.0
+    default_gain: ClassVar[float] = 5.0
+    default_retreat: ClassVar[float] = 0.05
+    default_priority: ClassVar[float] = _BELOW_THE_HAND
+
+    def gaps(self, tick: Tick) -> Gaps:
+        """Measure the elbow's offset."""
+        angle = _arm_angle(self, tick)
+        least = self.parameter(tick, "min", 0.05, unit="m", not_negative=True)
+        return Gaps(angle.offset - least, angle.offset_row, ca.SX.ones(1, 1))
 
 
 def _arm_angle(constraint: Constraint, tick: Tick) -> ArmAngle:

@@ -7,7 +7,7 @@ from typing import Final
 from ...solvers.plugins import PluginError, Registry
 from .base import Constraint
 from .contact_force import ContactForce
-from .elbow import ElbowHold, ElbowRange
+from .elbow import ElbowBend, ElbowHold, ElbowRange
 from .obstacles import Obstacles
 from .remote_centre import RemoteCentre
 from .self_collision import SelfCollision
@@ -22,6 +22,7 @@ _REGISTRY: Final = Registry(
         cls.kind: cls
         for cls in (
             ContactForce,
+            ElbowBend,
             ElbowHold,
             ElbowRange,
             Obstacles,

@@ -52,6 +52,7 @@ class SingularityAvoidance(GapConstraint):
     default_deceleration: ClassVar[float] = 0.5
     default_gain: ClassVar[float] = 5.0
     default_retreat: ClassVar[float] = 0.01
+    default_priority: ClassVar[float] = 1e-3
 
     def __post_init__(self) -> None:
         super().__post_init__()
