@@ -154,13 +154,16 @@ def arm_angle(kinematics: SymbolicKinematics, centres: Centres, reference: ca.SX
     J_side = J_elbow - lever * J_wrist  # the elbow's velocity less the line's
     row = slope * matmul(swing.T, J_side)
     row += off_line * dot(line, reference) * _faded_reciprocal(wrist) * matmul(turn.T, J_wrist)
+    # A row that is nothing but rounding would hold the arm in a random direction.
+    exists = ca.logic_and(off_line > _FADE, slope > _FADE)
+    row = ca.sparsify(ca.if_else(exists, row, 0))
     return ArmAngle(
         sine=dot(ca.cross(reference, side), line),
         cosine=dot(reference, side),
         row=row,
-        scale=off_line * slope,
+        scale=ca.if_else(exists, off_line * slope, 0),
         offset=off_line,
-        offset_row=matmul(_faded(side).T, J_side),
+        offset_row=ca.sparsify(ca.if_else(off_line > _FADE, matmul(_faded(side).T, J_side), 0)),
     )
 
 

@@ -95,21 +95,22 @@ class Constraint(ABC):
             raise DeclarationError(f"{self.name}: expected a formulation that has declared its command, got none yet")
         return qp.command_expression
 
-    def yielding(self, qp: QuadraticProgram, tick: Tick) -> ca.SX:
-        """Declare what a correction gives way by, and return it: a scalar in [0, 1], 0 where all of it is carried out.
+    def share(self, qp: QuadraticProgram, tick: Tick) -> ca.SX:
+        """Declare how much of a correction is carried out, and return it: a scalar in [0, 1].
 
-        Its cost is 1/2 priority y^2, with the run-time parameter `priority` in the units of the task's cost, so that
-        giving up a whole correction costs as much as a Cartesian error of sqrt(priority) m/s.
+        What is given up costs 1/2 priority (1 - share)^2, with the run-time parameter `priority` in the units of the
+        task's cost, so that giving up a whole correction costs as much as a Cartesian error of sqrt(priority) m/s. A
+        share instead of a slack keeps the rows homogeneous: no rounding makes them contradict each other at zero
+        motion.
         """
-        label = f"{self.name} yield"
-        given_up = qp.variable(label, 1)
+        label = f"{self.name} share"
+        share = qp.variable(label, 1)
         priority = self.parameter(tick, "priority", self.default_priority, unit="m^2/s^2", positive=True)
-        qp.minimize(given_up, weight=priority, name=label)
-        qp.between(0.0, given_up, 1.0, name=label)
+        qp.minimize(1 - share, weight=priority, name=label)
+        qp.between(0.0, share, 1.0, name=label)
         if qp.feasible_values:
-            # At the feasible point nothing needs to be corrected.
-            qp.feasible(**{label: 1.0})
-        return given_up
+            qp.feasible(**{label: 0.0})
+        return share
 
 
 @dataclass(frozen=True)

@@ -31,16 +31,16 @@ class ElbowHold(Constraint):
     The thesis lists "Elbow motion restriction (singularities avoidance)" among the features of the hand-guiding
     module, and gives no formula. Here it is the equality
 
-    .. math:: m\,\dot\psi = (1 - y)\,m\,c(\psi_{ref} - \psi)
+    .. math:: m\,\dot\psi = s\,m\,c(\psi_{ref} - \psi)
 
     with the arm angle :math:`\psi` of `kinqp.formulations.constraints.arm_angle`, m the factor that keeps its rate
-    finite, c gain times difference, limited to `speed`, and y in [0, 1] what the correction yields by. Zero motion
-    with y = 1 is always feasible: where limits or locked rows can't follow a correction, it is given up, and the
+    finite, c gain times difference, limited to `speed`, and s in [0, 1] the share of the correction. Zero motion
+    with s = 0 is always feasible: where limits or locked rows can't follow a correction, it is given up, and the
     angle still never moves away. The price is the thesis's "slide along the joint limit": with six rows guided or
     locked a seven-axis arm has no freedom left, and a joint on its limit then takes guided directions away. Use
     `ElbowRange` where it may.
 
-    Without `correct` there is no correction and no y: the rate is zero, and drift stays as it comes.
+    Without `correct` there is no correction and no s: the rate is zero, and drift stays as it comes.
 
     The angle is undefined where shoulder, elbow and wrist are in line (arm stretched), and where shoulder and wrist
     are in line with the reference direction. The row goes to zero there with m. An arm that is guided through the
@@ -87,7 +87,7 @@ class ElbowHold(Constraint):
         gain = self.parameter(tick, "gain", 5.0, unit="1/s", not_negative=True)
         speed = self.parameter(tick, "speed", 0.2, unit="rad/s", not_negative=True)
         back = -limited(ca.fmin(gain, 1 / tick.dt) * away, speed) * angle.scale
-        qp.equal(rate + back * self.yielding(qp, tick), back, name=self.name)
+        qp.equal(rate - back * self.share(qp, tick), 0.0, name=self.name)
 
 
 @dataclass(frozen=True, kw_only=True)

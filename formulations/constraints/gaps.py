@@ -62,7 +62,7 @@ class GapConstraint(Constraint):
     half dt^2 times the gap's second derivative at constant qd. So that this does not add up while the hand slides along
     a bound, `retreat` asks for rate >= min(retreat_gain |gap|, retreat_max), times a factor that is zero while the hand
     is at rest: the arm never moves of itself. A share of it is given up where limits, locked rows or another constraint
-    can't follow (the variable "<name> yield", cost 1/2 priority y^2), down to "no further". The loss then settles near
+    can't follow (the variable "<name> share", see `Constraint.share`), down to "no further". The loss then settles near
     c dt / (2 retreat_gain), with c that second derivative.
 
     Parameters
@@ -97,7 +97,7 @@ class GapConstraint(Constraint):
         """Measure the gaps."""
 
     def add(self, qp: QuadraticProgram, tick: Tick) -> None:
-        """Add one row for each gap, and the yielding of their retreat."""
+        """Add one row for each gap, and the share of their retreat."""
         measured = self.gaps(tick)
         if not measured.gap.size1():
             return
@@ -105,7 +105,7 @@ class GapConstraint(Constraint):
         lower = -measured.scale * self._closing_bound(tick, measured.gap)
         if self.retreat:
             back = measured.scale * self._retreat_rate(tick, measured.gap)
-            rate, lower = rate + back * self.yielding(qp, tick), lower + back
+            rate -= back * self.share(qp, tick)
         qp.between(lower, rate, np.inf, name=self.name)
 
     def _closing_bound(self, tick: Tick, gap: ca.SX) -> ca.SX:

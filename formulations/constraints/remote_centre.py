@@ -22,14 +22,14 @@ class RemoteCentre(Constraint):
     With the tool's axes x, y, z (z along the shaft), its tip p, the pivot r, the depth :math:`d = z'(r - p)` of the
     pivot along the shaft and the error :math:`e = (x'(r - p),\ y'(r - p))`, two equalities:
 
-    .. math:: (x, y)'(J_{lin} - d\,[z]_\times J_{ang})\,\dot q = (1 - y_c)\,c(e)
+    .. math:: (x, y)'(J_{lin} - d\,[z]_\times J_{ang})\,\dot q = s\,c(e)
 
     The left side is the sideways velocity of the point of the shaft beside the pivot, the right side a correction of
-    drift: gain times error, limited to `speed`, less what it yields by, :math:`y_c` in [0, 1]. These are the equality
-    constraints of the shared-control drilling robot, S'J qd = e with "e an adjustable error term for drift
+    drift: gain times error, limited to `speed`, times the share s in [0, 1] of it that is carried out. These are the
+    equality constraints of the shared-control drilling robot, S'J qd = e with "e an adjustable error term for drift
     compensation". Limits that can't follow a correction would make that rule infeasible; here the correction gives
-    way, in the variable "<name> yield" at a cost of 1/2 priority y^2, and with it the sideways motion is zero: zero
-    motion is always feasible.
+    way, by the variable "<name> share" at a cost of 1/2 priority (1 - s)^2, and at zero the sideways motion is zero:
+    zero motion is always feasible.
 
     `Mode.rcm(depth)` locks the same two rows at a fixed depth, whatever point of the world that is; at d = depth they
     are equal. This constraint fixes the pivot and lets the depth follow. So it goes with modes that leave these rows to
@@ -73,7 +73,7 @@ class RemoteCentre(Constraint):
         rows, error = shaft(tick, pivot)
         back = limited(ca.fmin(gain, 1 / tick.dt) * error, speed)
         sideways = matmul(rows, self.command_of(qp))
-        qp.equal(sideways + back * self.yielding(qp, tick), back, name=self.name)
+        qp.equal(sideways - back * self.share(qp, tick), 0.0, name=self.name)
 
 
 def shaft(tick: Tick, pivot: ca.SX) -> tuple[ca.SX, ca.SX]:
