@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 FRAMES: Final = ("world", "tool", "mode")
 # Reduced speed of the tool while a person guides the robot (ISO 10218-1:2011, 5.6.2) [m/s].
 _REDUCED_SPEED: Final = 0.25
+# No standard has one for turning: this project's choice, 0.25 m/s at 0.17 m from the axis [rad/s].
+_REDUCED_TURN: Final = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class TwistLimits(Constraint):
     <name>_linear : shape (3,)
         [m/s], 0.25 unless told otherwise (ISO 10218-1, reduced speed); infinite: none.
     <name>_angular : shape (3,)
-        [rad/s], none unless told otherwise.
+        [rad/s], 1.5 unless told otherwise; infinite: none.
     """
 
     frame: str = "world"
@@ -58,7 +60,7 @@ class TwistLimits(Constraint):
             tick, "linear", _REDUCED_SPEED, size=3, unit="m/s", not_negative=True, may_be_infinite=True
         )
         angular = self.parameter(
-            tick, "angular", float("inf"), size=3, unit="rad/s", not_negative=True, may_be_infinite=True
+            tick, "angular", _REDUCED_TURN, size=3, unit="rad/s", not_negative=True, may_be_infinite=True
         )
         most = ca.vertcat(linear, angular)
         qp.between(-most, matmul(self._rows(tick), self.command_of(qp)), most, name=self.name)

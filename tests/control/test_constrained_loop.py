@@ -1,8 +1,7 @@
-"""Constrained formulations in the control cycle and in the closed loop."""
+"""Constrained formulations in the closed loop: hands that push where they should not."""
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from kinqp.control import BOUND_TOLERANCE, Trajectory, make_step, simulate
-from kinqp.formulations import Mode, with_constraints
+from kinqp.formulations import with_constraints
 from kinqp.formulations.constraints import (
     Constraint,
     ContactForce,
@@ -27,7 +26,6 @@ from kinqp.formulations.constraints import (
     TwistLimits,
 )
 from kinqp.solvers import Status
-from tests.control.states import states
 from tests.formulations.constraints.rows import RowsOf
 from tests.formulations.constraints.test_rows import angle_by_hand
 from tests.robots.arms import arm
@@ -35,85 +33,11 @@ from tests.robots.arms import arm
 if TYPE_CHECKING:
     from kinqp.robots import Robot
 
+
 Array = NDArray[np.float64]
-DT = 1e-3
-FORMULATIONS = ("joint-space", "cartesian-error")
-# Inside the working range of both arms, and inside the arm itself.
-POST = Obstacle("post", (0.35, 0.1, 0.0), (0.35, 0.1, 0.7), 0.05)
-BALL = Obstacle("ball", (0.1, -0.1, 0.45), None, 0.1)
-SETS: dict[str, tuple[Constraint, ...]] = {
-    "gaps": (SelfCollision(), Obstacles(obstacles=(POST, BALL)), SingularityAvoidance(), TwistLimits()),
-    "pivot": (RemoteCentre(pivot=(0.5, 0.0, 0.3)), ContactForce(), TwistLimits(frame="tool")),
-    "guided": (SingularityAvoidance(rows="guided"), SelfCollision(approach="step", retreat=False)),
-    "elbow": (ElbowRange(), ElbowBend(), SelfCollision(approach="damper")),
-    "held": (ElbowHold(correct=True, angle=1.0), RemoteCentre(pivot=(0.5, 0.0, 0.3))),
-}
-ELBOW_SETS = ("elbow", "held")
-# The rest end in the safe stop: states with most joints on their limits, where the optimum is degenerate.
-LEAST_SOLVED = 0.97
-# To which a solver's answer satisfies rows, relative to their terms [-].
-ROWS_TOLERANCE = 2e-8
-
-
-def check_invariants(robot_name: str, formulation: str, which: str, count: int) -> None:
-    robot = arm(robot_name)
-    solved: Counter[bool] = Counter()
-    given = {"contact_force_normal": [0.0, 0.6, -0.8], "contact_force_now": 19.9} if which == "pivot" else {}
-    for text in ("free", "fix-orientation", "plane:0,1,0"):
-        mode = Mode.parse(text)
-        step = make_step(robot, with_constraints(formulation, SETS[which]), mode)
-        rows = [RowsOf(constraint, robot, text) for constraint in SETS[which]]
-        rng = np.random.default_rng(1)
-        for kind, q in states(robot, count):
-            v = rng.normal(size=mode.m_free) * rng.choice([1e-6, 0.01, 0.2, 2.0])
-            result = step(q, v, **given)
-            solved[result.status is Status.SOLVED] += 1
-            case = f"{text}, {kind}, q={q!r}, v={v!r}: {result.message}"
-            assert np.isfinite(result.qd).all(), case
-            assert result.status is not Status.PRIMAL_INFEASIBLE, case
-            if result.status is not Status.SOLVED:
-                assert not result.qd.any(), case
-                continue
-            assert (np.abs(result.qd) <= robot.qd_max + BOUND_TOLERANCE).all(), case
-            outward = np.where(q >= robot.q_max, result.qd, np.where(q <= robot.q_min, -result.qd, -np.inf))
-            assert outward.max() <= BOUND_TOLERANCE, case
-            locked = (mode.twist_map_at(robot.pose(q)) @ robot.jacobian(q))[list(mode.fixed_rows)]
-            share = np.maximum(np.abs(locked) @ np.abs(result.qd), 1.0)
-            assert (np.abs(locked @ result.qd) <= 2e-9 * share).all(), case
-            for one in rows:
-                check_rows(one(q, v, **given), result.qd, case)
-    assert solved[True] >= LEAST_SOLVED * solved.total(), solved
-
-
-def check_rows(at: dict[str, Array], qd: Array, case: str) -> None:
-    """Judge a command from the rows alone: what must hold even where a correction is given up."""
-    nv, scale = qd.size, 1.0 + np.abs(qd).sum()
-    rate = at["C"][:, :nv] @ qd
-    assert (rate >= at["l"] - ROWS_TOLERANCE * scale).all(), case
-    assert (rate <= at["u"] + ROWS_TOLERANCE * scale).all(), case
-    if at["A"].size:
-        moved, correction = at["A"][:, :nv] @ qd, -at["A"][:, nv:].sum(axis=1)
-        shared = float(np.clip(moved @ correction / max(correction @ correction, 1e-300), 0.0, 1.0))
-        assert np.abs(moved - shared * correction).max() <= ROWS_TOLERANCE * scale, case
-
-
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize(
-    ("robot_name", "which"),
-    [*(("lbr_med14", which) for which in SETS), *(("ur5e", which) for which in SETS if which not in ELBOW_SETS)],
-)
-def test_every_command_is_safe(robot_name: str, which: str, formulation: str) -> None:
-    check_invariants(robot_name, formulation, which, 30)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize(
-    ("robot_name", "which"),
-    [*(("lbr_med14", which) for which in SETS), *(("ur5e", which) for which in SETS if which not in ELBOW_SETS)],
-)
-def test_every_command_is_safe_on_many_states(robot_name: str, which: str, formulation: str) -> None:
-    check_invariants(robot_name, formulation, which, 2000)
+# The loop at 500 Hz: what is lost to linearisation grows with the square of the period.
+DT = 2e-3
+BOTH = ("joint-space", pytest.param("cartesian-error", marks=pytest.mark.long))
 
 
 @dataclass(frozen=True)
@@ -135,9 +59,9 @@ class Watch:
         rows = RowsOf(replace(constraint, approach="step", retreat=False), robot)
         offset = f"{constraint.name.replace('-', '_')}_margin"
         # A margin far below zero makes every bound positive, so that the step form shows the gap itself.
-        seen = [rows(q, dt=DT, **{offset: -10.0}) for q in (*run.q, run.q_end)]
-        self.gap = np.array([-at["l"] * DT for at in seen]) - 10.02
-        self.rate = np.array([at["C"] @ qd for at, qd in zip(seen, run.qd, strict=False)])
+        lower, C = rows.along(np.vstack([run.q, run.q_end]), dt=DT, **{offset: -10.0})
+        self.gap = -lower * DT - 10.02
+        self.rate = np.einsum("tij,tj->ti", C[:-1], run.qd)
         self.linearisation = np.abs(self.gap[1:] - self.gap[:-1] - DT * self.rate).max(axis=1)
 
 
@@ -151,12 +75,13 @@ def run(
 
 
 FOLDED = np.deg2rad([0.0, 40.0, 0.0, -90.0, 0.0, 50.0, 0.0])
-# What these runs lose to linearisation with retreat, 3 s at 0.3 m/s, is 0.7 um at most; twice that is allowed [m].
-LOST = 1.5e-6
+# What these runs lose to linearisation with retreat, 3 s at 0.3 m/s: 4.3 um at most at 500 Hz as here, 0.7 um at 1 kHz.
+# Twice that is allowed [m].
+LOST = 9e-6
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("approach", ["viable", "step"])
+@pytest.mark.parametrize("formulation", BOTH)
+@pytest.mark.parametrize("approach", ["viable", pytest.param("step", marks=pytest.mark.long)])
 def test_the_hand_pushes_the_arm_into_itself(formulation: str, approach: str) -> None:
     robot = arm("lbr_med14")
     constraint = SelfCollision(approach=approach)
@@ -173,8 +98,8 @@ def test_the_hand_pushes_the_arm_into_itself(formulation: str, approach: str) ->
     assert Watch(constraint, robot, bare).gap.min() < -0.05
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("mode", ["position", "fix-orientation"])
+@pytest.mark.parametrize("formulation", BOTH)
+@pytest.mark.parametrize("mode", ["position", pytest.param("fix-orientation", marks=pytest.mark.long)])
 def test_the_hand_pushes_the_forearm_along_a_post(mode: str, formulation: str) -> None:
     robot = arm("lbr_med14")
     post = Obstacle("post", (0.376, 0.2, -0.5), (0.376, 0.2, 0.6), 0.04)
@@ -187,7 +112,7 @@ def test_the_hand_pushes_the_forearm_along_a_post(mode: str, formulation: str) -
         assert watch.gap.min() < 1e-4
     assert lowest[True] > -LOST
     # What is lost per period, and that it adds up where nothing is ever taken back.
-    assert max(errors[True].max(), errors[False].max()) < 1e-6
+    assert max(errors[True].max(), errors[False].max()) < 4e-6
     assert lowest[True] >= lowest[False]
     assert lowest[False] > -errors[False].sum() - LOST
 
@@ -226,7 +151,7 @@ def test_an_arm_inside_an_obstacle_stays_until_it_is_guided_out() -> None:
     assert np.abs(stuck.qd).max() <= 1e-9 + BOUND_TOLERANCE
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", BOTH)
 def test_the_hand_pushes_into_the_manipulability_bound_and_back(formulation: str) -> None:
     robot = arm("lbr_med14")
     q0 = np.deg2rad([10.0, 30.0, 5.0, -60.0, -5.0, 60.0, 0.0])
@@ -241,7 +166,9 @@ def test_the_hand_pushes_into_the_manipulability_bound_and_back(formulation: str
     assert measure[-1] > 0.06  # not stuck: the way back is free
 
 
-@pytest.mark.parametrize("mode", ["position", "fix-orientation", "free"])
+@pytest.mark.parametrize(
+    "mode", ["free", *(pytest.param(m, marks=pytest.mark.long) for m in ("position", "fix-orientation"))]
+)
 def test_the_arm_angle_is_held_and_led(mode: str) -> None:
     robot = arm("lbr_med14")
     q0 = np.deg2rad([10.0, 30.0, 5.0, -60.0, -5.0, 60.0, 0.0])
@@ -274,7 +201,7 @@ def test_the_arm_angle_stops_at_the_end_of_its_range() -> None:
     step = make_step(robot, with_constraints("joint-space", [ElbowRange(), ElbowBend()]), "position")
     free, q, angles = np.array(q0), np.array(q0), []
     bare = make_step(robot, with_constraints("joint-space", [ElbowBend()]), "position")
-    for tick in range(1500):
+    for tick in range(750):
         v = push.twist(tick * DT, robot.pose(q))[:3]
         result = step(q, v, elbow_range_angle=start, elbow_range_width=0.02)
         assert result.status is Status.SOLVED
@@ -282,10 +209,10 @@ def test_the_arm_angle_stops_at_the_end_of_its_range() -> None:
         free = free + DT * bare(free, v).qd
         angles.append(angle_by_hand(robot, q) - start)
     assert abs(angle_by_hand(robot, free) - start) > 0.05
-    assert 0.0199 < np.abs(angles).max() < 0.02 + 1e-6
+    assert 0.0199 < np.abs(angles).max() < 0.02 + 1e-5
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("formulation", BOTH)
 def test_an_arm_kept_bent_never_stretches(formulation: str) -> None:
     """The LBR's elbow is 0.05 m off the line at A4 = 14.02 deg: 0.42 * 0.40 * sin(A4) / |SW|."""
     robot = arm("lbr_med14")
@@ -296,8 +223,8 @@ def test_an_arm_kept_bent_never_stretches(formulation: str) -> None:
     assert np.rad2deg(trajectory.q[:, 3].max()) == pytest.approx(-14.02, abs=0.01)
 
 
-@pytest.mark.parametrize("formulation", FORMULATIONS)
-@pytest.mark.parametrize("mode", ["free", "position"])
+@pytest.mark.parametrize("formulation", BOTH)
+@pytest.mark.parametrize("mode", ["free", pytest.param("position", marks=pytest.mark.long)])
 def test_the_shaft_stays_in_the_pivot_and_returns_to_it(mode: str, formulation: str) -> None:
     robot = arm("lbr_med14")
     q0 = np.deg2rad([10.0, 30.0, 5.0, -80.0, -5.0, 60.0, 0.0])
@@ -316,7 +243,7 @@ def test_the_shaft_stays_in_the_pivot_and_returns_to_it(mode: str, formulation: 
         assert max(offsets) < beside + 2e-5
         # 20 mm/s at most: 10 mm take half a second.
         if beside:
-            assert offsets[300] == pytest.approx(0.01 - 0.3 * 0.02, abs=2e-4)
+            assert offsets[round(0.3 / DT)] == pytest.approx(0.01 - 0.3 * 0.02, abs=2e-4)
         assert np.linalg.norm(np.diff(trajectory.position, axis=0), axis=1).sum() > 0.05
 
 
@@ -325,7 +252,7 @@ def test_the_hand_presses_no_harder_than_allowed() -> None:
     robot = arm("lbr_med14")
     step = make_step(robot, with_constraints("joint-space", [ContactForce()]), "fix-orientation")
     q, wall, forces = np.array(FOLDED), robot.pose(FOLDED)[0, 3] + 0.005, []
-    for _ in range(1000):
+    for _ in range(500):
         force = 1e4 * max(robot.pose(q)[0, 3] - wall, 0.0)
         forces.append(force)
         result = step(q, [0.1, 0.05, 0.0], contact_force_normal=[1.0, 0.0, 0.0], contact_force_now=force)
