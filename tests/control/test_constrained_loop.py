@@ -173,7 +173,7 @@ def test_the_arm_angle_is_held_and_led(mode: str) -> None:
     robot = arm("lbr_med14")
     q0 = np.deg2rad([10.0, 30.0, 5.0, -60.0, -5.0, 60.0, 0.0])
     start = angle_by_hand(robot, q0)
-    push = Push(((0.1, 0.1, -0.05, 0.1, 0.2, 0.1), (0.1, 0.1, -0.05, 0, 0, 0.1), (-0.1, -0.1, 0.05, 0.1, -0.2, 0)), 0.7)
+    push = Push(((0.1, 0.1, -0.05, 0.1, 0.2, 0.1), (0.1, 0.1, -0.05, 0, 0, 0.1), (-0.1, -0.1, 0.05, 0.1, -0.2, 0)), 0.5)
     ends: dict[str, Array] = {}
     for label, constraints in (
         ("free", []),
@@ -182,7 +182,7 @@ def test_the_arm_angle_is_held_and_led(mode: str) -> None:
         ("led", [ElbowHold(correct=True, angle=start + 0.1)]),
         ("ranged", [ElbowRange()]),
     ):
-        trajectory = run(robot, "joint-space", [*constraints, ElbowBend()], mode, push, q0, 2.1)
+        trajectory = run(robot, "joint-space", [*constraints, ElbowBend()], mode, push, q0, 1.5)
         ends[label] = np.array([angle_by_hand(robot, q) for q in trajectory.q]) - start
     assert np.ptp(ends["free"]) > 5e-3
     # Held, the angle drifts with the square of the period; corrected, it does not add up. Measured 4e-5 and 5e-6.
