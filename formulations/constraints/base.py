@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import casadi as ca
 
+from ..algebra import matmul
 from ..base import Formulation
 from ..program import DeclarationError
 
@@ -95,6 +96,24 @@ class Constraint(ABC):
             raise DeclarationError(f"{self.name}: expected a formulation that has declared its command, got none yet")
         return qp.command_expression
 
+    def rate_of(self, qp: QuadraticProgram, rows: ca.SX) -> ca.SX:
+        """Return rows @ command, shape (k, 1), affine in the variables, for rows of shape (k, nv).
+
+        Coefficients that are nothing but rounding become zero, as they do in `kinqp.formulations.robust_inverse`: a row
+        that can't take part in the motion would otherwise block half of all directions, in a random way, as soon as its
+        bound is zero.
+        """
+        command = self.command_of(qp)
+        rows = ca.sparsify(ca.if_else(ca.fabs(rows) > _ROUNDING, rows, 0))
+        x = ca.vertcat(*qp.variables.values())
+        K = ca.jacobian(command, x)
+        if K.is_constant():
+            return matmul(rows, command)
+        slope = matmul(rows, K)
+        noise = _ROUNDING * matmul(ca.fabs(rows), ca.fabs(K))
+        kept = ca.sparsify(ca.if_else(ca.fabs(slope) > noise, slope, 0))
+        return matmul(kept, x) + matmul(rows, ca.substitute(command, x, ca.SX.zeros(x.size1(), 1)))
+
     def share(self, qp: QuadraticProgram, tick: Tick) -> ca.SX:
         """Declare how much of a correction is carried out, and return it: a scalar in [0, 1].
 
@@ -163,3 +182,5 @@ def unit_or_zero(vector: ca.SX) -> ca.SX:
 
 # Vectors shorter than this have no direction [m, or 1].
 _SHORTEST = 1e-9
+# Entries of rows smaller than this, beside lever arms of the size of the arm, are rounding [m/rad, or 1].
+_ROUNDING = 1e-12

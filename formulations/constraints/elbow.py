@@ -9,7 +9,6 @@ import casadi as ca
 import numpy as np
 
 from ...solvers.options import flag
-from ..algebra import matmul
 from .arm_angle import ArmAngle, arm_angle, find_centres
 from .base import Constraint, limited, unit_or_zero
 from .gaps import GapConstraint, Gaps
@@ -79,7 +78,7 @@ class ElbowHold(Constraint):
     def add(self, qp: QuadraticProgram, tick: Tick) -> None:
         """Add the equality."""
         angle = _arm_angle(self, tick)
-        rate = matmul(angle.row, self.command_of(qp))
+        rate = self.rate_of(qp, angle.row)
         if not self.correct:
             qp.equal(rate, 0.0, name=self.name)
             return

@@ -10,7 +10,6 @@ import casadi as ca
 import numpy as np
 
 from ...solvers.options import flag
-from ..algebra import matmul
 from ..bounds import viable_bound
 from .base import Constraint
 
@@ -101,7 +100,7 @@ class GapConstraint(Constraint):
         measured = self.gaps(tick)
         if not measured.gap.size1():
             return
-        rate = matmul(measured.rows, self.command_of(qp))
+        rate = self.rate_of(qp, measured.rows)
         lower = -measured.scale * self._closing_bound(tick, measured.gap)
         if self.retreat:
             back = measured.scale * self._retreat_rate(tick, measured.gap)

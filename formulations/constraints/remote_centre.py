@@ -72,7 +72,7 @@ class RemoteCentre(Constraint):
         speed = self.parameter(tick, "speed", 0.02, unit="m/s", not_negative=True)
         rows, error = shaft(tick, pivot)
         back = limited(ca.fmin(gain, 1 / tick.dt) * error, speed)
-        sideways = matmul(rows, self.command_of(qp))
+        sideways = self.rate_of(qp, rows)
         qp.equal(sideways - back * self.share(qp, tick), 0.0, name=self.name)
 
 

@@ -17,6 +17,10 @@ ROWS: Final = ("all", "position", "guided")
 # Added to the squared singular values, so that neither the measure nor its gradient is ever undefined. At a smallest
 # singular value of 0.05 it makes the measure larger by 2e-6 of itself.
 _SHIFT: Final = 1e-8
+# Gradients of the measures are of the size of the arm; one above this is that of a jump, or rounding [1/rad or 1/m].
+_STEEPEST: Final = 1e3
+# At a singularity the shift leaves a gradient below this, which points anywhere but out of it.
+_FLATTEST: Final = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,15 +33,16 @@ class SingularityAvoidance(GapConstraint):
     :math:`\mu` = 1e-8 so that it has a gradient everywhere. The shared-control drilling robot names the subtask
     ("singularity avoidance") without a formula; with `approach="step"` this is w + grad w' qd dt >= w_min.
 
-    Below the bound w may not fall further; at the singularity itself, within some 1e-4 of it in the smallest singular
-    value, the gradient vanishes and with it the row. Units are mixed as the Jacobian's are, so the bound is chosen per
-    arm: the LBR Med 14 has w near 0.1 in the middle of its workspace over all six rows.
+    Below the bound w may not fall further. At the singularity itself, within some 1e-6 of it in the smallest singular
+    value, the gradient vanishes, and the row is left out. Units are mixed as the Jacobian's are, so the bound is chosen
+    per arm: over all six rows, the LBR Med 14 has a median w of 0.065 over its joint ranges, the UR5e of 0.013.
 
     Parameters
     ----------
     rows : {"all", "position", "guided"}
         Which J: all six rows; the three translations; or the guided rows within the null space of the locked ones,
-        J_bar, which also sees algorithmic singularities and, with many locked rows, is the costly one.
+        J_bar, which also sees algorithmic singularities. That measure jumps where the locked rows themselves lose rank;
+        close to there its gradient is no guide, and the row is dropped where it exceeds 1e3.
 
     Run-time parameters
     -------------------
@@ -63,7 +68,10 @@ class SingularityAvoidance(GapConstraint):
         """Measure the manipulability."""
         measure = manipulability(self.jacobian(tick))
         bound = self.parameter(tick, "w_min", 0.02, unit="product of m and rad", positive=True)
-        return Gaps(measure - bound, ca.jacobian(measure, tick.q), ca.SX.ones(1, 1))
+        gradient = ca.jacobian(measure, tick.q)
+        steepness = ca.sumsqr(gradient)
+        usable = ca.logic_and(steepness > _FLATTEST**2, steepness < _STEEPEST**2)
+        return Gaps(measure - bound, ca.if_else(usable, gradient, 0), ca.SX.ones(1, 1))
 
     def jacobian(self, tick: Tick) -> ca.SX:
         """Give the rows whose singular values count."""

@@ -63,7 +63,7 @@ class TwistLimits(Constraint):
             tick, "angular", _REDUCED_TURN, size=3, unit="rad/s", not_negative=True, may_be_infinite=True
         )
         most = ca.vertcat(linear, angular)
-        qp.between(-most, matmul(self._rows(tick), self.command_of(qp)), most, name=self.name)
+        qp.between(-most, self.rate_of(qp, self._rows(tick)), most, name=self.name)
 
     def _rows(self, tick: Tick) -> ca.SX:
         if self.frame == "mode":

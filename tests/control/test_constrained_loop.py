@@ -184,7 +184,7 @@ def test_the_arm_angle_is_held_and_led(mode: str) -> None:
     ):
         trajectory = run(robot, "joint-space", [*constraints, ElbowBend()], mode, push, q0, 1.5)
         ends[label] = np.array([angle_by_hand(robot, q) for q in trajectory.q]) - start
-    assert np.ptp(ends["free"]) > 5e-3
+    assert np.ptp(ends["free"]) > 2e-3
     # Held, the angle drifts with the square of the period; corrected, it does not add up. Measured 4e-5 and 5e-6.
     assert np.ptp(ends["held"]) < 1e-4
     assert np.ptp(ends["corrected"]) < 1e-5

@@ -382,3 +382,14 @@ def test_symbols_are_shared_with_the_tick() -> None:
     operations = [function.instruction_id(i) for i in range(function.n_instructions())]
     assert operations.count(ca.OP_SIN) <= 6
     assert function.n_instructions() < 3500
+
+
+def test_a_measure_without_a_gradient_has_no_row() -> None:
+    """The UR5e with its wrist singular: the locked rows lose rank, and the guided measure jumps."""
+    robot = arm("ur5e")
+    q = np.array([0.3, -1.2, 1.5, 0.4, 0.0, 0.7])
+    rows = RowsOf(SingularityAvoidance(rows="guided"), robot, "fix-orientation")
+    at, beside = rows(q, v=[0.1, 0.0, 0.0]), rows(q + 0.3, v=[0.1, 0.0, 0.0])
+    assert np.isfinite(at["C"]).all()
+    assert np.abs(at["C"][0, :6]).max() < 1e3
+    assert 0.01 < np.abs(beside["C"][0, :6]).max() < 10.0
