@@ -112,7 +112,10 @@ class Constraint(ABC):
         slope = matmul(rows, K)
         noise = _ROUNDING * matmul(ca.fabs(rows), ca.fabs(K))
         kept = ca.sparsify(ca.if_else(ca.fabs(slope) > noise, slope, 0))
-        return matmul(kept, x) + matmul(rows, ca.substitute(command, x, ca.SX.zeros(x.size1(), 1)))
+        offset = matmul(rows, ca.substitute(command, x, ca.SX.zeros(x.size1(), 1)))
+        # What is left of a row without coefficients is rounding too, and would contradict a bound of zero.
+        alive = ca.sum2(ca.fabs(kept)) > 0
+        return matmul(kept, x) + ca.if_else(alive, offset, 0)
 
     def share(self, qp: QuadraticProgram, tick: Tick) -> ca.SX:
         """Declare how much of a correction is carried out, and return it: a scalar in [0, 1].

@@ -18,7 +18,7 @@ ROWS: Final = ("all", "position", "guided")
 # singular value of 0.05 it makes the measure larger by 2e-6 of itself.
 _SHIFT: Final = 1e-8
 # Gradients of the measures are of the size of the arm; one above this is that of a jump, or rounding [1/rad or 1/m].
-_STEEPEST: Final = 1e3
+_STEEPEST: Final = 30.0
 # At a singularity the shift leaves a gradient below this, which points anywhere but out of it.
 _FLATTEST: Final = 1e-3
 
@@ -42,7 +42,7 @@ class SingularityAvoidance(GapConstraint):
     rows : {"all", "position", "guided"}
         Which J: all six rows; the three translations; or the guided rows within the null space of the locked ones,
         J_bar, which also sees algorithmic singularities. That measure jumps where the locked rows themselves lose rank;
-        close to there its gradient is no guide, and the row is dropped where it exceeds 1e3.
+        close to there its gradient is no guide, and the row is dropped where it exceeds 30.
 
     Run-time parameters
     -------------------
