@@ -27,7 +27,7 @@ from kinqp.formulations.constraints import (
 )
 from kinqp.solvers import Status
 from tests.formulations.constraints.rows import RowsOf
-from tests.formulations.constraints.test_rows import angle_by_hand
+from tests.formulations.constraints.test_posture_rows import angle_by_hand
 from tests.robots.arms import arm
 
 if TYPE_CHECKING:
