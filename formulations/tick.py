@@ -64,6 +64,8 @@ class Input:
 class Tick:
     """What a formulation may build on: state, hand velocity, Jacobian rows, inverse, bounds, run-time parameters.
 
+    Every quantity is a ``ca.SX`` column or matrix in SI units. `v` and `v_fixed` are counted along the mode's axes.
+
     Parameters
     ----------
     robot : Robot
@@ -72,10 +74,6 @@ class Tick:
         Which rows of the twist are guided and which are locked.
     bounds : {"viable", "thesis"}
         How `qd_lo` and `qd_hi` follow from the limits.
-
-    Notes
-    -----
-    Every quantity is a ``ca.SX`` column or matrix in SI units. `v` and `v_fixed` are counted along the mode's axes.
     """
 
     def __init__(self, robot: Robot, mode: Mode, bounds: str = "viable") -> None:
