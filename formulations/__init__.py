@@ -26,7 +26,7 @@ from .minimum_torque_norm import MinimumTorqueNorm
 from .minimum_velocity_norm import MinimumVelocityNorm
 from .modes import MODE_NAMES, Mode, ModeError
 from .program import DeclarationError, QuadraticProgram
-from .registry import available_formulations, get_formulation
+from .registry import available_formulations, get_formulation, with_constraints
 from .result import StepResult
 from .spy import PlotError
 from .task_scaling import TaskScaling
@@ -87,4 +87,5 @@ __all__ = [
     "thesis_bound",
     "velocity_bounds",
     "viable_bound",
+    "with_constraints",
 ]

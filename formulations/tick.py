@@ -67,6 +67,8 @@ class Input:
 class Tick:
     """What a formulation may build on: state, hand velocity, Jacobian rows, inverse, bounds, run-time parameters.
 
+    Every quantity is a ``ca.SX`` column or matrix in SI units. `v` and `v_fixed` are counted along the mode's axes.
+
     Parameters
     ----------
     robot : Robot
@@ -77,10 +79,6 @@ class Tick:
         How `qd_lo` and `qd_hi` follow from the limits.
     cut : bool
         Give null space, inverse and bounds as symbols, and say in `cuts` how to compute them: for generated C.
-
-    Notes
-    -----
-    Every quantity is a ``ca.SX`` column or matrix in SI units. `v` and `v_fixed` are counted along the mode's axes.
     """
 
     def __init__(self, robot: Robot, mode: Mode, bounds: str = "viable", *, cut: bool = False) -> None:
@@ -238,6 +236,11 @@ class Tick:
     @cached_property
     def _dynamics(self) -> SymbolicKinematics:
         return self.robot.symbolic(self.q, self.qd_prev)
+
+    @property
+    def kinematics(self) -> SymbolicKinematics:
+        """The arm's kinematics at `q`, world axes: of its links too, where a constraint needs more than the tool."""
+        return self._kinematics
 
     @property
     def pose(self) -> ca.SX:

@@ -4,6 +4,7 @@ Arms: limits, and numeric and symbolic kinematics, from URDF files or DH tables.
 Use `load_robot`; everything else is for those who add a robot or build on one.
 """
 
+from .capsules import Capsule, CapsuleModel, capsule_model
 from .checks import FloatArray, finite_vector
 from .dh import DhRow, robot_from_dh
 from .errors import RobotError
@@ -16,6 +17,8 @@ from .urdf import robot_from_urdf
 __all__ = [
     "DEFAULT_PRISMATIC_QDD_MAX",
     "DEFAULT_REVOLUTE_QDD_MAX",
+    "Capsule",
+    "CapsuleModel",
     "DhRow",
     "FloatArray",
     "Robot",
@@ -23,6 +26,7 @@ __all__ = [
     "RobotError",
     "SymbolicKinematics",
     "available_robots",
+    "capsule_model",
     "finite_vector",
     "load_robot",
     "robot_from_dh",

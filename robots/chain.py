@@ -69,12 +69,16 @@ class Chain:
         Shape (3,): tool centre point in the last joint's frame [m].
     gravity
         Shape (3,): acceleration of gravity in the base frame [m/s^2].
+    link_rotations, link_translations
+        Per joint, shapes (3, 3) and (3,): pinocchio's joint frame (the URDF's link frame) in ours [m].
     """
 
     segments: tuple[Segment, ...]
     tool_rotation: FloatArray
     tool_translation: FloatArray
     gravity: FloatArray
+    link_rotations: tuple[FloatArray, ...]
+    link_translations: tuple[FloatArray, ...]
 
 
 def snap(value: FloatArray) -> FloatArray:
@@ -195,9 +199,12 @@ def build_chain(model: Any, frame_id: int) -> Chain:
                 inertia=snap(lower),
             )
         )
+    link_frames = [change.inverse() for change in changes[1 : count + 1]]
     return Chain(
         segments=tuple(segments),
         tool_rotation=snap(links[count].rotation),
         tool_translation=snap(links[count].translation),
         gravity=snap(model.gravity.linear),
+        link_rotations=tuple(snap(frame.rotation) for frame in link_frames),
+        link_translations=tuple(snap(frame.translation) for frame in link_frames),
     )

@@ -21,6 +21,8 @@ from . import algebra, dynamics
 from .errors import RobotError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from .algebra import Columns, Scalar, Vector
     from .chain import Chain
 
@@ -40,12 +42,23 @@ class _Walk:
         Vector from the last joint's origin to the tool centre point [m].
     tool_axes
         Axes of the tool's frame.
+    frames
+        Axes of each joint's own frame, after its motion.
     """
 
     axes: tuple[Vector, ...]
     offsets: tuple[Vector, ...]
     tool_offset: Vector
     tool_axes: Columns
+    frames: tuple[Columns, ...]
+
+    @cached_property
+    def origins(self) -> tuple[Vector, ...]:
+        """Origin of each joint's frame [m]."""
+        origins = [self.offsets[0]]
+        for offset in self.offsets[1:]:
+            origins.append(algebra.add(origins[-1], offset))
+        return tuple(origins)
 
     @cached_property
     def levers(self) -> tuple[Vector, ...]:
@@ -99,6 +112,64 @@ class SymbolicKinematics:
             else:
                 columns.append((*algebra.cross(axis, lever), *axis))
         return ca.densify(ca.SX(ca.horzcat(*(ca.vertcat(*column) for column in columns))))
+
+    def point_on_link(self, link: int, position: Sequence[float]) -> ca.SX:
+        """
+        Position in the base frame of a point fixed to a link.
+
+        Parameters
+        ----------
+        link
+            Number of the joint that moves the link, counted from 1; 0 is the base.
+        position
+            Shape (3,): the point in the link's frame, as in the URDF (pinocchio's joint frame) [m].
+
+        Returns
+        -------
+        Shape (3, 1) [m].
+
+        Raises
+        ------
+        RobotError
+            If there is no such link.
+        """
+        self._check_link(link)
+        local = algebra.vector(position)
+        if link == 0:
+            return ca.SX(ca.vertcat(*local))
+        turned = algebra.apply(algebra.columns(self.chain.link_rotations[link - 1]), local)
+        inside = algebra.add(turned, algebra.vector(self.chain.link_translations[link - 1]))
+        world = algebra.add(self._walk.origins[link - 1], algebra.apply(self._walk.frames[link - 1], inside))
+        return ca.SX(ca.vertcat(*world))
+
+    def point_jacobian(self, link: int, point: ca.SX) -> ca.SX:
+        """
+        Jacobian of the velocity of a point carried by a link.
+
+        Parameters
+        ----------
+        link
+            As for `point_on_link`.
+        point
+            Shape (3, 1): where the point is now, in the base frame [m]; it need not be a fixed one of the link.
+
+        Returns
+        -------
+        Shape (3, nv), world axes; columns of joints beyond the link are zero by structure.
+
+        Raises
+        ------
+        RobotError
+            If there is no such link.
+        """
+        self._check_link(link)
+        at = (point[0], point[1], point[2])
+        jacobian = ca.SX(3, len(self.chain.segments))
+        for i, segment in enumerate(self.chain.segments[:link]):
+            axis = self._walk.axes[i]
+            column = axis if segment.prismatic else algebra.cross(axis, algebra.subtract(at, self._walk.origins[i]))
+            jacobian[:, i] = ca.vertcat(*column)
+        return ca.sparsify(jacobian)
 
     @cached_property
     def jdot_qd(self) -> ca.SX:
@@ -167,7 +238,7 @@ class SymbolicKinematics:
     @cached_property
     def _walk(self) -> _Walk:
         frame = algebra.IDENTITY
-        axes, offsets = [], []
+        axes, offsets, frames = [], [], []
         for segment, motion in zip(self.chain.segments, self._motions, strict=True):
             rotation = algebra.columns(segment.rotation)
             offset = algebra.apply(frame, algebra.vector(segment.translation))
@@ -180,12 +251,18 @@ class SymbolicKinematics:
                 algebra.subtract(algebra.scale(y, motion.cosine), algebra.scale(x, motion.sine)),
                 z,
             )
+            frames.append(frame)
         return _Walk(
             axes=tuple(axes),
             offsets=tuple(offsets),
             tool_offset=algebra.apply(frame, algebra.vector(self.chain.tool_translation)),
             tool_axes=algebra.compose(frame, algebra.columns(self.chain.tool_rotation)),
+            frames=tuple(frames),
         )
+
+    def _check_link(self, link: int) -> None:
+        if not 0 <= link <= len(self.chain.segments):
+            raise RobotError(f"link: expected 0 (the base) to {len(self.chain.segments)}, got {link}")
 
     def _velocities(self, wanted: str) -> list[Scalar]:
         if self.qd is None:
