@@ -2,6 +2,7 @@
 
 from .definite import CurvatureError
 from .export import ExportError, export_c
-from .step import BatchResult, CompiledStep, TickResult, compile_step
+from .results import BatchResult, TickResult
+from .step import CompiledStep, compile_step
 
 __all__ = ["BatchResult", "CompiledStep", "CurvatureError", "ExportError", "TickResult", "compile_step", "export_c"]

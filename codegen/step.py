@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from ..solvers.native import NATIVE, build_library, declarations
 from . import qrqp
 from .model import identifier, step_code
 from .render import render_batch, render_step
+from .results import BatchResult, TickResult
 
 if TYPE_CHECKING:
     from collections.abc import Container
@@ -30,75 +30,8 @@ if TYPE_CHECKING:
 SOLVER: Final = "active-set"
 SOLVERS: Final = (SOLVER, qrqp.NAME)
 _DOUBLE: Final = np.dtype(np.float64)
+_new: Final = tuple.__new__
 _FAILED: Final = STATUSES.index(Status.FAILED)
-
-
-class TickResult(NamedTuple):
-    """The command of one control cycle; a tuple, because making one takes a third of the time of a dataclass.
-
-    Attributes
-    ----------
-    qd : ndarray, shape (nv,)
-        Joint velocity command [rad/s or m/s]; the safe stop (zero, or the fastest admissible braking; see
-        `Formulation.safe_stop`) unless `status` is SOLVED, or MAX_ITERATIONS of a step that keeps to admissible points.
-    eps : ndarray, shape (m_free,)
-        Cartesian error J_free qd - v [m/s, rad/s].
-    status : Status
-    iterations : int
-        Active-set steps.
-    sides : ndarray of int, shape (rows,)
-        -1, 0 or +1 for each row: which of its sides holds the command back.
-    rows : tuple of str
-        Names of the rows.
-    """
-
-    qd: Array
-    eps: Array
-    status: Status
-    iterations: int
-    sides: Integers
-    rows: tuple[str, ...]
-
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Names of the rows that hold the command back, with their side: "joint limits[3] upper"."""
-        return tuple(
-            f"{name} {'upper' if side > 0 else 'lower'}"
-            for name, side in zip(self.rows, self.sides, strict=True)
-            if side
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class BatchResult:
-    """The commands of many control cycles.
-
-    Attributes
-    ----------
-    qd : ndarray, shape (N, nv)
-        [rad/s or m/s].
-    eps : ndarray, shape (N, m_free)
-        [m/s, rad/s].
-    codes : ndarray of int, shape (N,)
-        Status by number, 0 being SOLVED; see `status`.
-    iterations : ndarray of int, shape (N,)
-    sides : ndarray of int, shape (N, rows)
-        As in `TickResult`.
-    rows : tuple of str
-        Names of the rows.
-    """
-
-    qd: Array
-    eps: Array
-    codes: Integers
-    iterations: Integers
-    sides: Integers
-    rows: tuple[str, ...]
-
-    @property
-    def status(self) -> tuple[Status, ...]:
-        """Status of each tick."""
-        return tuple(STATUSES[code] for code in self.codes)
 
 
 class CompiledStep:
@@ -175,6 +108,8 @@ class CompiledStep:
         self._qd: Final = self._view(self._output, "qd")
         self._eps: Final = self._view(self._output, "eps")
         self._sides: Final = self._view(self._output, "active", np.dtype(np.intc))
+        self._no_sides: Final = np.zeros_like(self._sides)
+        self._no_sides.flags.writeable = False
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -203,19 +138,24 @@ class CompiledStep:
         self._q[:] = q if fits else check_input(self._specs["q"], q, self.mode)
         fits = type(v) is np.ndarray and v.dtype is _DOUBLE and v.shape == self._shape_v
         self._v[:] = v if fits else check_input(self._specs["v"], v, self.mode)
-        restore = self._override(inputs) if inputs or self._required else None
-        try:
-            code = self._run(self._parameters, self._input, self._output)
-        finally:
-            if restore:
-                for values, before in restore:
-                    values[:] = before
+        output = self._output
+        simple = not (inputs or self._required)
+        code = self._run(self._parameters, self._input, output) if simple else self._run_with(inputs)
         if code == _FAILED:
             for name, values in (("q", self._q), ("v", self._v)):
                 check_input(self._specs[name], values, self.mode)
-        return TickResult(
-            self._qd.copy(), self._eps.copy(), STATUSES[code], self._output.iterations, self._sides.copy(), self._rows
-        )
+        iterations = output.iterations
+        # Without a step no row is active; and past NamedTuple's own constructor, which takes twice the time.
+        sides = self._sides.copy() if iterations else self._no_sides
+        return _new(TickResult, (self._qd.copy(), self._eps.copy(), STATUSES[code], iterations, sides, self._rows))
+
+    def _run_with(self, inputs: dict[str, ArrayLike]) -> int:
+        restore = self._override(inputs)
+        try:
+            return int(self._run(self._parameters, self._input, self._output))
+        finally:
+            for values, before in restore:
+                values[:] = before
 
     def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> BatchResult:
         """Compute the commands of many states in one call into C.

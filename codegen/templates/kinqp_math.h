@@ -29,10 +29,13 @@ KINQP_INLINE void kinqp_sincos_near(const double *at, double *sine, double *cosi
                                  2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10};
     static const double even[] = {4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
                                   -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11};
-    kinqp_part p = kinqp_part_fill(odd[5]), e = kinqp_part_fill(even[5]);
-    for (int i = 4; i >= 0; --i) {
-        p = kinqp_part_fill(odd[i]) + r2 * p;
-        e = kinqp_part_fill(even[i]) + r2 * e;
+    /* In pairs, for short chains. */
+    const kinqp_part r4 = r2 * r2;
+    kinqp_part p = kinqp_part_fill(odd[4]) + r2 * kinqp_part_fill(odd[5]);
+    kinqp_part e = kinqp_part_fill(even[4]) + r2 * kinqp_part_fill(even[5]);
+    for (int i = 2; i >= 0; i -= 2) {
+        p = (kinqp_part_fill(odd[i]) + r2 * kinqp_part_fill(odd[i + 1])) + r4 * p;
+        e = (kinqp_part_fill(even[i]) + r2 * kinqp_part_fill(even[i + 1])) + r4 * e;
     }
     const kinqp_part s = r + (r * r2 * p + rest);
     const kinqp_part half = kinqp_part_fill(0.5) * r2, near = one - half;
@@ -52,16 +55,13 @@ KINQP_INLINE void kinqp_sincos_near(const double *x, double *sine, double *cosin
         const double r = head - turns * 2.02226624879595063154e-21;
         const double rest = (head - r) - turns * 2.02226624879595063154e-21;
         const double r2 = r * r;
-        const double odd = -1.66666666666666324348e-01 +
-                           r2 * (8.33333333332248946124e-03 +
-                                 r2 * (-1.98412698298579493134e-04 +
-                                       r2 * (2.75573137070700676789e-06 +
-                                             r2 * (-2.50507602534068634195e-08 + r2 * 1.58969099521155010221e-10))));
-        const double even = 4.16666666666666019037e-02 +
-                            r2 * (-1.38888888888741095749e-03 +
-                                  r2 * (2.48015872894767294178e-05 +
-                                        r2 * (-2.75573143513906633035e-07 +
-                                              r2 * (2.08757232129817482790e-09 + r2 * -1.13596475577881948265e-11))));
+        const double r4 = r2 * r2;
+        const double odd = (-1.66666666666666324348e-01 + r2 * 8.33333333332248946124e-03) +
+                           r4 * ((-1.98412698298579493134e-04 + r2 * 2.75573137070700676789e-06) +
+                                 r4 * (-2.50507602534068634195e-08 + r2 * 1.58969099521155010221e-10));
+        const double even = (4.16666666666666019037e-02 + r2 * -1.38888888888741095749e-03) +
+                            r4 * ((2.48015872894767294178e-05 + r2 * -2.75573143513906633035e-07) +
+                                  r4 * (2.08757232129817482790e-09 + r2 * -1.13596475577881948265e-11));
         const double s = r + (r * r2 * odd + rest);
         const double half = 0.5 * r2, one = 1.0 - half;
         const double c = one + (((1.0 - one) - half) + (r2 * r2 * even - r * rest));

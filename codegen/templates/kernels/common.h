@@ -41,19 +41,20 @@ KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double
     return least;
 }
 
-/* The same, and whether the matrix is far from singular: every row keeps at least 1e-4 of its squared length outside the
- * span of those before. Three rows by cofactors, whose chains are short; they are exact enough while this holds. */
-KINQP_INLINE int kinqp_inverse_of_positive(int m, const double *matrix, double *inverse) {
+/* scale * inverse: the same, and whether the matrix is far from singular: every row keeps at least 1e-4 of its squared
+ * length outside the span of those before. Three rows by cofactors, whose chains are short, exact enough while this holds;
+ * what multiplies them need not wait for `scale`, the reciprocal of the determinant. */
+KINQP_INLINE int kinqp_inverse_of_positive(int m, const double *matrix, double *inverse, double *scale) {
+    *scale = 1.0;
     if (m != 3) return kinqp_inverse_by_factors(m, matrix, inverse) > 1e-4;
     const double a = matrix[0], b = matrix[1], c = matrix[2], d = matrix[4], e = matrix[5], f = matrix[8];
-    const double aa = d * f - e * e, ab = c * e - b * f, ac = b * e - c * d;
-    const double bb = a * f - c * c, bc = b * c - a * e, cc = a * d - b * b;
-    const double determinant = a * aa + (b * ab + c * ac), scale = 1.0 / determinant;
-    inverse[0] = aa * scale;
-    inverse[1] = inverse[3] = ab * scale;
-    inverse[2] = inverse[6] = ac * scale;
-    inverse[4] = bb * scale;
-    inverse[5] = inverse[7] = bc * scale;
-    inverse[8] = cc * scale;
+    inverse[0] = d * f - e * e;
+    inverse[1] = inverse[3] = c * e - b * f;
+    inverse[2] = inverse[6] = b * e - c * d;
+    inverse[4] = a * f - c * c;
+    inverse[5] = inverse[7] = b * c - a * e;
+    inverse[8] = a * d - b * b;
+    const double determinant = a * inverse[0] + (b * inverse[1] + c * inverse[2]);
+    *scale = 1.0 / determinant;
     return determinant > 1e-4 * (a * (d * f));
 }

@@ -41,7 +41,7 @@ static void kinqp_locked_rows_dependent(int k, int m, int n, const double *J, co
 KINQP_INLINE void kinqp_locked_rows(int k, int m, int n, const double *J, const double *F, const double *v_fixed,
                                      const double *v, double *J_bar, double *qd, double *v_left) {
     const int stride = kinqp_padded(n);
-    double gram[36], cross[36], inverse[36];
+    double gram[36], cross[36], inverse[36], scale;
     int drift = 0;
     for (int j = 0; j < m; ++j) drift |= v_fixed[j] < 0.0 || v_fixed[j] > 0.0;
     for (int l = 0; l < stride; ++l) qd[l] = 0.0;
@@ -50,13 +50,13 @@ KINQP_INLINE void kinqp_locked_rows(int k, int m, int n, const double *J, const 
             gram[i * m + j] = gram[j * m + i] = kinqp_dot_padded(stride, F + i * stride, F + j * stride);
     for (int i = 0; i < k; ++i)
         for (int j = 0; j < m; ++j) cross[i * m + j] = kinqp_dot_padded(stride, J + i * stride, F + j * stride);
-    if (kinqp_inverse_of_positive(m, gram, inverse)) {
+    if (kinqp_inverse_of_positive(m, gram, inverse, &scale)) {
         double shares[36];
         for (int i = 0; i < k; ++i)
             for (int j = 0; j < m; ++j) {
                 double value = cross[i * m] * inverse[j];
                 for (int l = 1; l < m; ++l) value += cross[i * m + l] * inverse[l * m + j];
-                shares[i * m + j] = value;
+                shares[i * m + j] = value * scale;
             }
         for (int b = 0; b < stride; b += 4) {
             kinqp_lanes rest;
@@ -69,7 +69,7 @@ KINQP_INLINE void kinqp_locked_rows(int k, int m, int n, const double *J, const 
         for (int j = 0; drift && j < m; ++j) {
             double along = inverse[j * m] * v_fixed[0];
             for (int l = 1; l < m; ++l) along += inverse[j * m + l] * v_fixed[l];
-            kinqp_add_padded(stride, qd, along, F + j * stride, qd);
+            kinqp_add_padded(stride, qd, along * scale, F + j * stride, qd);
         }
     } else {
         kinqp_locked_rows_dependent(k, m, n, J, F, v_fixed, J_bar, qd);

@@ -4,18 +4,18 @@ KINQP_INLINE void kinqp_robust_inverse(int m, int n, const double *J, double thr
                                         double *inverse) {
     const int stride = kinqp_padded(n);
     const double least = threshold * threshold;
-    double gram[36], G[36], trace = 0.0, frobenius2 = 0.0;
+    double gram[36], G[36], scale, trace = 0.0, frobenius2 = 0.0;
     for (int i = 0; i < m; ++i) {
         for (int j = 0; j <= i; ++j)
             gram[i * m + j] = gram[j * m + i] = kinqp_dot_padded(stride, J + i * stride, J + j * stride);
         trace += gram[i * m + i];
     }
-    const int regular = kinqp_inverse_of_positive(m, gram, G);
+    const int regular = kinqp_inverse_of_positive(m, gram, G, &scale);
     for (int i = 0; i < m; ++i) {
         for (int j = 0; j < i; ++j) frobenius2 += 2.0 * (G[i * m + j] * G[i * m + j]);
         frobenius2 += G[i * m + i] * G[i * m + i];
     }
-    if (!regular || !(least * least * frobenius2 < 0.9999)) {
+    if (!regular || !(least * least * (frobenius2 * (scale * scale)) < 0.9999)) {
         /* A shift far below any threshold in use keeps the inverse finite at the singularity itself. */
         const double shift = 1e-12 * trace + 1e-100;
         double moved[36];
@@ -28,12 +28,14 @@ KINQP_INLINE void kinqp_robust_inverse(int m, int n, const double *J, double thr
         const double damping = damping_max * (weakness > 0.0 ? weakness : 0.0);
         for (int i = 0; i < m; ++i) gram[i * m + i] += damping * damping;
         kinqp_inverse_by_factors(m, gram, G);
+        scale = 1.0;
     }
     for (int r = 0; r < m; ++r)
         for (int b = 0; b < stride; b += 4) {
             kinqp_lanes value;
             kinqp_scaled(G[r * m], J + b, &value);
             for (int k = 1; k < m; ++k) kinqp_add_scaled(G[r * m + k], J + k * stride + b, &value);
+            kinqp_multiply(scale, &value);
             kinqp_store(inverse + r * stride + b, &value);
         }
 }
