@@ -88,7 +88,8 @@ def reduce(lowered: Lowered) -> Reduced:
     offset = ca.vertcat(data["C"] @ t, _rows(t, bounded))
     start = data["x_feasible"]
     return Reduced(
-        H=ca.sparsify(T.T @ HT),
+        # Each pair of entries by one formula: CasADi doesn't see that the other one's gives the same.
+        H=ca.sparsify(ca.triu2symm(ca.triu(T.T @ HT))),
         g=ca.sparsify(T.T @ (data["H"] @ t + data["g"])),
         A=A,
         b=b,

@@ -12,17 +12,17 @@ KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const d
 }
 
 /* inverse (m, m) := the inverse of a symmetric positive definite matrix, m <= 6, by L D L' without pivoting. Returns the
- * smallest share of any diagonal entry that is left as its pivot. */
+ * product of the shares of its diagonal entries that are left as pivots: 1 for orthogonal rows, 0 for dependent ones. */
 KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double *inverse) {
-    double L[36], scaled[36], reciprocal[6], least = 1.0;
+    double L[36], scaled[36], reciprocal[6], independence = 1.0;
     for (int j = 0; j < m; ++j) {
         for (int i = j; i < m; ++i) {
             double value = matrix[i * m + j];
             for (int k = 0; k < j; ++k) value -= L[i * m + k] * scaled[j * m + k];
             scaled[i * m + j] = value;
         }
-        const double pivot = scaled[j * m + j], share = pivot / matrix[j * m + j];
-        least = share >= least ? least : share; /* also if it isn't a number */
+        const double pivot = scaled[j * m + j];
+        independence *= pivot / matrix[j * m + j];
         reciprocal[j] = 1.0 / pivot;
         for (int i = j + 1; i < m; ++i) L[i * m + j] = scaled[i * m + j] * reciprocal[j];
     }
@@ -38,12 +38,12 @@ KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double
         }
         for (int i = c; i < m; ++i) inverse[i * m + c] = inverse[c * m + i] = x[i];
     }
-    return least;
+    return independence;
 }
 
-/* scale * inverse: the same, and whether the matrix is far from singular: every row keeps at least 1e-4 of its squared
- * length outside the span of those before. Three rows by cofactors, whose chains are short, exact enough while this holds;
- * what multiplies them need not wait for `scale`, the reciprocal of the determinant. */
+/* scale * inverse: the same, and whether the matrix is far from singular: that product is at least 1e-4. Three rows by
+ * cofactors, whose chains are short, exact enough while this holds; what multiplies them need not wait for `scale`, the
+ * reciprocal of the determinant. */
 KINQP_INLINE int kinqp_inverse_of_positive(int m, const double *matrix, double *inverse, double *scale) {
     *scale = 1.0;
     if (m != 3) return kinqp_inverse_by_factors(m, matrix, inverse) > 1e-4;
