@@ -43,7 +43,7 @@ class Kernel:
 
 KERNELS: Final = {
     "locked_rows": Kernel(("rows", "rows", "plain", "plain"), ("rows", "columns", "plain")),
-    "robust_inverse": Kernel(("rows", "number", "number"), ("columns",)),
+    "robust_inverse": Kernel(("rows", "number", "number", "plain", "columns"), ("columns", "columns")),
     "viable_bounds": Kernel(("plain", "plain", "plain", "plain", "plain", "number"), ("plain", "plain")),
     "thesis_bounds": Kernel(("plain", "plain", "plain", "plain", "plain", "number"), ("plain", "plain")),
 }

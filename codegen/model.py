@@ -150,8 +150,8 @@ class ModeCode:
 
     @property
     def n_null(self) -> int:
-        """Variables left where the equalities have full rank."""
-        return self.n - self.m_eq
+        """Variables left where the equalities have full rank, at least one: C has no arrays of size zero."""
+        return max(1, self.n - self.m_eq)
 
     @property
     def row_stride(self) -> int:
@@ -365,6 +365,9 @@ def _aliases(outputs: dict[str, ca.SX], layouts: dict[str, Layout], cuts: Sequen
     for cut in cuts:
         for k, (symbol, layout) in enumerate(zip(cut.symbols, KERNELS[cut.kernel].results, strict=True)):
             for name, value in outputs.items():
-                if layouts[name] == layout != "plain" and _identical(value, symbol):
+                # A single column and a single row stand alike.
+                given = value.T if value.size1() == 1 and layout == "columns" and layouts[name] == "rows" else value
+                same = layouts[name] == layout or given is not value
+                if same and layout != "plain" and _identical(given, symbol):
                     found[name] = f"{cut.kernel}_{k}"
     return found

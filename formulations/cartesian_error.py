@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from .algebra import matmul
 from .base import Formulation
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class CartesianError(Formulation):
         eps = qp.variable("eps", tick.m_free)
         weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
         qp.minimize(eps, weight=weight, name="Cartesian error")
-        qd_d = tick.qd_fixed + matmul(tick.inverse, tick.v_left)
+        qd_d = tick.qd_task
         qp.between(tick.qd_lo - qd_d, tick.inverse @ eps, tick.qd_hi - qd_d, name="joint limits")
         qp.command(qd_d + tick.inverse @ eps)
         qp.feasible(eps=-tick.v_left)

@@ -289,14 +289,27 @@ class Tick:
         """Guided rows within the null space of the locked ones, J_free N_c, shape (m_free, nv)."""
         return self._locked[0]
 
-    @cached_property
+    @property
     def inverse(self) -> ca.SX:
         """Singularity-robust inverse of `J_bar`, shape (nv, m_free); its columns never move the locked rows."""
+        return self._inverse[0]
+
+    @property
+    def qd_task(self) -> ca.SX:
+        """Joint velocity that gives the locked rows `v_fixed` and, where nothing is damped, the guided rows `v`.
+
+        J# v_left + qd_fixed, shape (nv, 1) [rad/s or m/s].
+        """
+        return self._inverse[1]
+
+    @cached_property
+    def _inverse(self) -> tuple[ca.SX, ...]:
         threshold = self.parameter("damping_threshold", 0.08, lowest=0.0, positive=True, unit="m or rad")
         damping_max = self.parameter("damping_max", 0.05, lowest=0.0, positive=True, unit="m or rad")
-        formulas = (robust_inverse(self.J_bar, threshold, damping_max),)
-        inputs = (self.J_bar, threshold, damping_max)
-        return self._computed("robust_inverse", (self.m_free, self.nv), inputs, formulas)[0]
+        inverse = robust_inverse(self.J_bar, threshold, damping_max)
+        formulas = (inverse, self.qd_fixed + matmul(inverse, self.v_left))
+        inputs = (self.J_bar, threshold, damping_max, self.v_left, self.qd_fixed)
+        return self._computed("robust_inverse", (self.m_free, self.nv), inputs, formulas)
 
     @cached_property
     def qd_fixed(self) -> ca.SX:

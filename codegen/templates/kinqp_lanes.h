@@ -73,6 +73,9 @@ KINQP_INLINE void kinqp_scaled(double share, const double *p, kinqp_lanes *x) {
 KINQP_INLINE void kinqp_add_scaled(double share, const double *p, kinqp_lanes *x) {
     for (int i = 0; i < KINQP_PARTS; ++i) x->at[i] += kinqp_part_fill(share) * kinqp_part_load(p + i * KINQP_WIDTH);
 }
+KINQP_INLINE void kinqp_add_times(double share, const kinqp_lanes *x, kinqp_lanes *sum) {
+    for (int i = 0; i < KINQP_PARTS; ++i) sum->at[i] += kinqp_part_fill(share) * x->at[i];
+}
 KINQP_INLINE void kinqp_multiply(double share, kinqp_lanes *x) {
     for (int i = 0; i < KINQP_PARTS; ++i) x->at[i] *= kinqp_part_fill(share);
 }

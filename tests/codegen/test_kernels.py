@@ -122,7 +122,9 @@ def test_locked_rows(k: int, m: int, n: int) -> None:
 @pytest.mark.parametrize(("m", "n"), [(1, 7), (2, 7), (3, 7), (3, 3), (4, 6), (6, 7)])
 def test_robust_inverse(m: int, n: int) -> None:
     J, threshold, most = ca.SX.sym("J", m, n), ca.SX.sym("t"), ca.SX.sym("d")
-    formula = ca.Function("inverse", [J, threshold, most], [robust_inverse(J, threshold, most)])
+    v, offset = ca.SX.sym("v", m), ca.SX.sym("offset", n)
+    inverse = robust_inverse(J, threshold, most)
+    formula = ca.Function("inverse", [J, threshold, most, v, offset], [inverse, offset + inverse @ v])
     rng = np.random.default_rng(m)
     damped = 0
     for _ in range(600):
@@ -131,10 +133,12 @@ def test_robust_inverse(m: int, n: int) -> None:
         if rng.random() < 0.4:
             singular = rng.uniform(0.05, 1.2, m)
         rows = (U * singular) @ Vt
-        got = call("robust_inverse", (m, n), [rows, np.array([0.08]), np.array([0.05])], [(n, m)])[0]
-        wanted = np.asarray(formula(rows, 0.08, 0.05))
+        asked = [rng.normal(size=m), rng.normal(size=(n, 1))]
+        given = [rows, np.array([0.08]), np.array([0.05]), *asked]
+        got = call("robust_inverse", (m, n), given, [(n, m), (n, 1)])
         damped += singular.min() < 0.08
-        np.testing.assert_allclose(got, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
+        for mine, wanted in zip(got, map(np.asarray, formula(rows, 0.08, 0.05, *asked)), strict=True):
+            np.testing.assert_allclose(mine, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
     assert 100 < damped < 580
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from kinqp.codegen import compile_step
 from kinqp.codegen.model import StepCode, identifier, step_code
 from kinqp.codegen.render import render_step
 from kinqp.codegen.step import STEP_FLAGS
@@ -69,6 +70,7 @@ def test_rendering_twice_gives_the_same_bytes(formulation: str) -> None:
 
 ELSEWHERE = """
 import sys
+from kinqp.codegen import compile_step
 from kinqp.codegen.model import step_code
 from kinqp.codegen.render import render_step
 from kinqp.formulations import Mode, get_formulation
@@ -112,6 +114,16 @@ def test_the_smallest_and_the_largest_mode_stand_alone(tmp_path: Path, formulati
     """Without locked rows there is no `v_fixed`, and C99 has no empty arrays; with one variable loops are empty."""
     source = write(tmp_path, several(formulation, mode))
     run(need("gcc"), *STRICT, "-fsyntax-only", source.name, cwd=tmp_path)
+
+
+def test_a_task_that_leaves_no_freedom_compiles_and_runs(tmp_path: Path) -> None:
+    """Six joints, six hard rows: nothing is left to optimise, and C99 has no arrays of size zero."""
+    made = get_formulation("minimum-velocity-norm(task=hard)")
+    source = write(tmp_path, step_code(arm("ur5e"), made, [Mode.parse("free")], "kinqp_square"))
+    run(need("gcc"), *STRICT, "-O1", "-c", source.name, "-o", "step.o", cwd=tmp_path)
+    q, v = np.array([0.1, -1.0, 1.2, 0.3, 1.0, 0.2]), np.full(6, 0.01)
+    result = compile_step(arm("ur5e"), made, "free")(q, v)
+    np.testing.assert_allclose(result.qd, np.linalg.solve(arm("ur5e").jacobian(q), v), rtol=0, atol=1e-12)
 
 
 def test_is_a_c_plus_plus_header(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
-/* J' (J J' + lambda^2 I)^-1 of m rows over n joints (padded), its columns padded: see `robust_inverse` in
- * kinqp.formulations. Where the smallest singular value is surely above the threshold, lambda is zero. */
+/* inverse: J' (J J' + lambda^2 I)^-1 of m rows over n joints (padded), its columns padded; see `robust_inverse` in
+ * kinqp.formulations. qd (n, padded): inverse v + offset. Where the smallest singular value is surely above the threshold,
+ * lambda is zero. */
 KINQP_INLINE void kinqp_robust_inverse(int m, int n, const double *J, double threshold, double damping_max,
-                                        double *inverse) {
+                                       const double *v, const double *offset, double *inverse, double *qd) {
     const int stride = kinqp_padded(n);
     const double least = threshold * threshold;
     double gram[36], G[36], scale, trace = 0.0, frobenius2 = 0.0;
@@ -30,12 +31,16 @@ KINQP_INLINE void kinqp_robust_inverse(int m, int n, const double *J, double thr
         kinqp_inverse_by_factors(m, gram, G);
         scale = 1.0;
     }
-    for (int r = 0; r < m; ++r)
-        for (int b = 0; b < stride; b += 4) {
-            kinqp_lanes value;
+    for (int b = 0; b < stride; b += 4) {
+        kinqp_lanes value, moved;
+        kinqp_load(offset + b, &moved);
+        for (int r = 0; r < m; ++r) {
             kinqp_scaled(G[r * m], J + b, &value);
             for (int k = 1; k < m; ++k) kinqp_add_scaled(G[r * m + k], J + k * stride + b, &value);
             kinqp_multiply(scale, &value);
             kinqp_store(inverse + r * stride + b, &value);
+            kinqp_add_times(v[r], &value, &moved);
         }
+        kinqp_store(qd + b, &moved);
+    }
 }
