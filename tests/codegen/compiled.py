@@ -45,8 +45,8 @@ Case = tuple[str, str, str]
 @functools.cache
 def code(robot: str, formulation: str, mode: str) -> StepCode:
     """Work out the code of a step under the prefix that `CompiledStep` gives it."""
-    prefix = step_module.identifier(f"kinqp_{robot}_{formulation}")
     chosen = Everything() if formulation == Everything.name else get_formulation(formulation)
+    prefix = step_module.identifier(f"kinqp_{robot}_{chosen.name}")
     return step_code(arm(robot), chosen, [Mode.parse(mode)], prefix)
 
 
