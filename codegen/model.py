@@ -275,7 +275,7 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
     first, rest = needed_for([*(call.text for call in staged.first), *lines], early, calls)
     second, third = needed_for(rest, [aliases.get(name, name) for name in late], calls)
     padded_arrays = [*staged.padded, *(name for name, layout in layouts.items() if layout != "plain")]
-    first, second = pack(first, padded_arrays), pack(second, padded_arrays)
+    first, second, third = (pack(part, padded_arrays) for part in (first, second, third))
     rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
     return ModeCode(
         text=str(mode),

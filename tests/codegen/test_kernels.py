@@ -205,6 +205,23 @@ def test_drift_is_corrected_alike() -> None:
                 np.testing.assert_allclose(mine.qd, other.qd, rtol=0, atol=1e-7)
 
 
+def test_the_admissible_point_follows_drift_correction() -> None:
+    """Kernels that only the feasible mode needs get padded rows too: a capped tick starts from what they give."""
+    code = step_code(arm("lbr_med14"), get_formulation("joint-space"), [Mode.fix_orientation()], "k").modes[0]
+    assert any(line.startswith("kinqp_locked_rows(") for line in code.start_body)
+    assert sum(line.startswith("kinqp_put(") for line in code.start_body) == 12  # two times three rows of eight
+    step = compiled("lbr_med14", "joint-space", "fix-orientation", quick=True, feasible=True, max_iterations=0)
+    rng, capped = np.random.default_rng(6), 0
+    for _ in range(60):
+        q = 0.8 * arm("lbr_med14").random_configuration(rng)
+        drift = 1e-3 * rng.normal(size=3)
+        result = step(q, 3.0 * rng.normal(size=3), v_fixed=drift)
+        if result.status.value == "max_iterations":
+            capped += 1
+            np.testing.assert_allclose(arm("lbr_med14").jacobian(q)[3:] @ result.qd, drift, rtol=0, atol=1e-9)
+    assert capped > 20
+
+
 def test_unused_cuts_are_left_out() -> None:
     tick = Tick(arm("ur5e"), Mode.fix_orientation(), cut=True)
     inverse, _ = tick.inverse, tick.qd_lo
