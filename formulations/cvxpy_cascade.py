@@ -66,7 +66,8 @@ class CvxpyCascade:
         for level in self.levels:
             given = {name: value for name, value in (inputs | above).items() if name in level.inputs}
             level.set(**given)
-            level.problem.solve(solver=solver, **(options or {}))
+            problem: Any = level.problem  # whose solve carries no types
+            problem.solve(solver=solver, **(options or {}))
             command = level.command()
             above = {ABOVE: command}
         return command

@@ -37,8 +37,8 @@ NAMES = (
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
 NARROW = 2.0
 # Compiled and interpreted are to agree to 1e-9; a last command that contradicts the locked rows by 1 rad/s, as in these
-# tests, makes multipliers of 1e4 and more beside a joint weight of 1e-4. The compiled step, which doesn't refine, is off
-# by up to 2.5e-9 then (panda at q = 0), measured against the same active set solved in exact fractions.
+# tests, makes multipliers of 1e4 and more beside a joint weight of 1e-4. The compiled step, which doesn't refine, is
+# off by up to 2.5e-9 then (panda at q = 0), measured against the same active set solved in exact fractions.
 PARITY = 5e-9
 
 
