@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..formulations import Evaluator, Mode, get_formulation, lower
+from ..formulations import ABOVE, Evaluator, Mode, get_formulation, levels_of, lower
 from ..solvers import get_solver
 from ..solvers.native import CompilerError, compiler
 from .emit import number
-from .model import identifier, step_code
+from .fields import identifier
+from .model import step_code
 from .render import environment, library_version, render_step
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from ..formulations import Formulation
     from ..robots import Robot
+    from ..solvers import Solver
     from .model import StepCode
 
     Array = NDArray[np.float64]
@@ -127,7 +129,7 @@ def export_c(
                     "text": mode_code.text,
                     "free_names": mode_code.free_names,
                     "locked": ", ".join(mode.row_names[row] for row in mode.fixed_rows) or "nothing",
-                    "size": f"{mode_code.n_null} x {mode_code.m}",
+                    "size": mode_code.size,
                 }
                 for mode, mode_code in zip(parsed, code.modes, strict=True)
             ],
@@ -151,8 +153,8 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
     columns: list[tuple[int, Array, Array, Array, Array]] = []
     needs_previous = False
     for index, mode in enumerate(modes):
-        evaluate = Evaluator(lower(formulation, robot, mode))
-        needs_previous = any(given.name == "qd_prev" for given in evaluate.inputs)
+        levels = [Evaluator(lower(level, robot, mode)) for level in levels_of(formulation)]
+        needs_previous = any(given.name == "qd_prev" for level in levels for given in level.inputs)
         solver = get_solver("active-set", tolerance=1e-10)
         q = low + (0.25 + 0.5 * rng.random(robot.nv)) * (high - low)
         q[1::2] = high[1::2] - 1e-3  # several at once, so that the solver has something to do
@@ -161,14 +163,12 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
         phase = rng.uniform(0.0, 2.0 * np.pi, mode.m_free)
         for tick in range(TICKS_PER_MODE):
             v = amplitude * np.sin(phase + 2.0 * np.pi * tick / TICKS_PER_MODE)
-            previous = {"qd_prev": qd} if needs_previous else {}
-            instance = evaluate(q=q, v=v, **previous)
-            solution = solver.solve(instance.qp)
-            if not solution.solved:
-                qd = instance.stop
+            command, stop = _command(levels, solver, {"q": q, "v": v, "qd_prev": qd})
+            if command is None:
+                qd = stop
                 q = q + 1e-3 * rng.normal(size=robot.nv)
                 continue
-            before, qd = qd, instance.K @ solution.x + instance.k
+            before, qd = qd, command
             columns.append((index, q, v, qd, before))
             q = q + 1e-3 * qd
     if not columns:
@@ -181,6 +181,18 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
         np.array([qd for _, _, _, qd, _ in columns]),
         np.array([before for *_, before in columns]) if needs_previous else None,
     )
+
+
+def _command(levels: Sequence[Evaluator], solver: Solver, given: dict[str, Array]) -> tuple[Array | None, Array]:
+    """Command and safe stop at a state; no command where a level is not solved."""
+    for evaluate in levels:
+        names = {each.name for each in evaluate.inputs}
+        instance = evaluate(**{name: value for name, value in given.items() if name in names})
+        solution = solver.solve(instance.qp)
+        if not solution.solved:
+            return None, instance.stop
+        given = given | {ABOVE: instance.K @ solution.x + instance.k}
+    return given[ABOVE], instance.stop
 
 
 def recorded_header(recorded: Recorded, code: StepCode) -> str:

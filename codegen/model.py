@@ -2,81 +2,32 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import casadi as ca
 
-from ..formulations import lower
+from ..formulations import Hierarchy, levels_of, lower
 from .definite import require_definite
-from .emit import emit, needed_for, number
+from .cascade import cascade_code
+from .emit import emit, needed_for
+from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
 from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from ..formulations import Cut, Formulation, Input, Lowered, Mode
     from ..robots import Robot
+    from .fields import Field
     from .kernels import Layout
 
-# New at every tick; all other run-time inputs are parameters.
-_SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 # Rows of these are padded, for loops over four columns at a time.
 _PADDED: Final = ("A", "J")
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
 _LATE: Final = ("C", "start")
-_COMMENTS: Final = {
-    "q": "joint positions",
-    "v": "velocity that the hand asks for, along the mode's axes",
-    "qd_prev": "joint velocities of the tick before",
-    "v_fixed": "velocity of the locked rows; zero unless drift is corrected",
-    "dt": "control period",
-    "q_min": "lower position limits; -INFINITY: none",
-    "q_max": "upper position limits; INFINITY: none",
-    "qd_max": "velocity limits",
-    "qdd_max": "acceleration limits",
-    "tau_max": "torque or force limits",
-    "task_weight": "weights of the Cartesian error",
-    "joint_weight": "weights of the joint velocities",
-    "damping_threshold": "smallest singular value below which damping sets in",
-    "damping_max": "damping at the singularity",
-    "time_constant": "lag of the tool behind the hand; at least one period",
-    "stretch_penalty": "weight of exceeding acceleration limits",
-    "torque_stretch_penalty": "weight of exceeding torque limits",
-    "brake_penalty": "weight of braking self-motion",
-    "scale_penalty": "weight of slowing the task down",
-    "acceleration_weight": "weights of the joint accelerations",
-    "torque_weight": "weights of the joint torques",
-    "joint_damping": "rate at which self-motion dies away",
-}
-
-
-@dataclass(frozen=True)
-class Field:
-    """A field of a C struct.
-
-    Attributes
-    ----------
-    name, comment : str
-        The comment ends with the unit.
-    size : int
-        Number of entries.
-    array : bool
-        Whether it is an array even with one entry.
-    defaults : tuple of str
-        C literals, one per entry.
-    """
-
-    name: str
-    comment: str
-    size: int
-    array: bool
-    defaults: tuple[str, ...]
-
-
 @dataclass(frozen=True)
 class Shape:
     """What is known of a mode's QP whatever the numbers, and saves work in its code.
@@ -119,21 +70,16 @@ class Shape:
         )
 
 
-@dataclass(frozen=True)
-class ModeCode:
-    """One motion mode of a generated library.
+@dataclass(frozen=True, kw_only=True)
+class ModeCode(ModeText):
+    """One motion mode of a formulation of one QP.
 
     `body` is what every tick computes, `late_body` what is needed only where the minimiser without rows is outside of
     some, `start_body` what is needed of that only to keep to admissible points.
     """
 
-    text: str
-    symbol: str
-    free_names: str
     n: int
     m: int
-    m_free: int
-    m_fixed: int
     m_eq: int
     shape: Shape
     arrays: tuple[str, ...]
@@ -142,11 +88,17 @@ class ModeCode:
     body: tuple[str, ...]
     late_body: tuple[str, ...]
     start_body: tuple[str, ...]
-    row_body: tuple[str, ...]
     kernels: tuple[str, ...]
-    finite: tuple[Field, ...]
-    rows: tuple[str, ...]
-    inputs: tuple[Input, ...]
+
+    @property
+    def size(self) -> str:
+        """Variables x rows, in words."""
+        return f"{self.n_null} x {self.m}"
+
+    @property
+    def starts(self) -> bool:
+        """Whether a feasible point was declared."""
+        return self.shape.start
 
     @property
     def n_null(self) -> int:
@@ -185,7 +137,8 @@ class StepCode:
         The largest over the modes.
     parameters, inputs : tuple of Field
         Of the two structs; the largest size over the modes.
-    modes : tuple of ModeCode
+    modes : tuple of ModeText
+        All `ModeCode`, or, of a hierarchy, all `CascadeCode`.
     brake_body : tuple of str
         Statements of the safe stop by braking; empty where the safe stop is zero velocity.
     """
@@ -200,21 +153,33 @@ class StepCode:
     max_iterations: int
     parameters: tuple[Field, ...]
     inputs: tuple[Field, ...]
-    modes: tuple[ModeCode, ...]
+    modes: tuple[ModeText, ...]
     brake_body: tuple[str, ...]
+
+    @property
+    def single(self) -> tuple[ModeCode, ...]:
+        """The modes that are one QP each: all, or none."""
+        return tuple(mode for mode in self.modes if isinstance(mode, ModeCode))
 
     @property
     def sizes(self) -> tuple[tuple[int, int], ...]:
         """Distinct (variables, rows) of the solver, in order."""
-        sizes = [(mode.n, mode.m) for mode in self.modes]
+        sizes = [(mode.n, mode.m) for mode in self.single]
         # With equalities of full rank the problem is that much smaller; without, it is padded to its full size.
-        sizes += [(mode.n_null, mode.m) for mode in self.modes if mode.m_eq]
+        sizes += [(mode.n_null, mode.m) for mode in self.single if mode.m_eq]
         return tuple(dict.fromkeys(sizes))
 
 
 def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], prefix: str) -> StepCode:
     """Work out the code of a formulation on a robot in one or more modes."""
-    codes = tuple(_mode_code(formulation, robot, mode) for mode in modes)
+    codes: tuple[ModeText, ...]
+    if isinstance(formulation, Hierarchy):
+        codes = cascades = tuple(cascade_code(formulation, robot, mode) for mode in modes)
+        max_iterations = max(code.max_iterations for code in cascades)
+    else:
+        codes = single = tuple(_mode_code(formulation, robot, mode) for mode in modes)
+        max_iterations = max(10 * (code.m + code.n) + 50 for code in single)
+    last = levels_of(formulation)[-1]
     largest: dict[str, Input] = {}
     for code in codes:
         # A mode without locked rows has nothing to say of their velocity, and C99 has no arrays of size zero.
@@ -228,32 +193,20 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
         nv=robot.nv,
         m_free=max(code.m_free for code in codes),
         m_fixed=max(code.m_fixed for code in codes),
-        rows=max(code.m for code in codes),
-        max_iterations=max(10 * (code.m + code.n) + 50 for code in codes),
-        parameters=tuple(_field(given) for name, given in largest.items() if name not in _SIGNALS),
-        inputs=tuple(_field(given) for name, given in largest.items() if name in _SIGNALS),
+        rows=max(len(code.rows) for code in codes),
+        max_iterations=max_iterations,
+        parameters=tuple(field_of(given) for name, given in largest.items() if name not in SIGNALS),
+        inputs=tuple(field_of(given) for name, given in largest.items() if name in SIGNALS),
         modes=codes,
-        brake_body=_brake_body(lower(formulation, robot, modes[0])) if formulation.safe_stop == "braking" else (),
+        brake_body=_brake_body(lower(last, robot, modes[0])) if last.safe_stop == "braking" else (),
     )
-
-
-def identifier(text: str) -> str:
-    """Turn a name into a C identifier."""
-    return re.sub(r"\W+", "_", text.replace("-", "_")).strip("_").lower()
-
-
-def _field(given: Input) -> Field:
-    default = given.default if given.default is not None else [0.0] * given.size
-    comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')} [{given.unit}]"
-    array = given.size > 1 or given.name in _SIGNALS or given.name in ("task_weight", "joint_weight")
-    return Field(given.name, comment, given.size, array, tuple(number(float(x)) for x in default))
 
 
 def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
     lowered, reduced = _lower_for_c(formulation, robot, mode)
     inputs, tick = lowered.inputs, lowered.tick
-    fields = {given.name: _field(given) for given in inputs}
-    sources = _sources(fields)
+    fields = {given.name: field_of(given) for given in inputs}
+    sources = sources_of(fields)
     shape = Shape.of(reduced)
     outputs = _outputs(lowered, reduced, shape)
     cuts = used(tick.cuts, list(outputs.values()))
@@ -276,10 +229,9 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
     second, third = needed_for(rest, [aliases.get(name, name) for name in late], calls)
     padded_arrays = [*staged.padded, *(name for name, layout in layouts.items() if layout != "plain")]
     first, second, third = (pack(part, padded_arrays) for part in (first, second, third))
-    rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
     return ModeCode(
         text=str(mode),
-        symbol=identifier(str(mode).replace("-", "m") if "-" in mode.argument else str(mode)),
+        symbol=mode_symbol(mode),
         free_names=", ".join(mode.free_names),
         n=reduced.n,
         m=reduced.m,
@@ -297,26 +249,18 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
         body=tuple(first),
         late_body=tuple(second),
         start_body=tuple(third),
-        row_body=tuple(emit(rows, ["q"], ["rows"], {f"q[{i}]": f"[{i}]" for i in range(tick.nv)})),
+        row_body=row_statements(tick),
         kernels=tuple(dict.fromkeys(cut.kernel for cut in cuts)),
-        finite=tuple(field for name, field in fields.items() if name in _SIGNALS and field.size),
+        finite=tuple(field for name, field in fields.items() if name in SIGNALS and field.size),
         rows=reduced.rows,
         inputs=inputs,
     )
 
 
-def _sources(fields: Mapping[str, Field]) -> dict[str, str]:
-    # A parameter that is a plain number is read through its address, as an array of one.
-    return {
-        name: f"in->{name}" if name in _SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"
-        for name, field in fields.items()
-    }
-
-
 def _brake_body(lowered: Lowered) -> tuple[str, ...]:
     brake = ca.densify(lowered.tick.qd_brake)
     function = ca.Function("brake", [given.symbol for given in lowered.inputs], [brake])
-    sources = _sources({given.name: _field(given) for given in lowered.inputs})
+    sources = sources_of({given.name: field_of(given) for given in lowered.inputs})
     return tuple(emit(function, list(sources.values()), ["qd"]))
 
 

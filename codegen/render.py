@@ -6,11 +6,11 @@ import re
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 
-from ..solvers.active_set import fixed_size_sources
+from ..solvers.active_set import embedded_source, fixed_size_sources
 from .kernels import padded
 
 if TYPE_CHECKING:
@@ -50,23 +50,14 @@ def render_step(code: StepCode) -> dict[str, str]:
     """
     sources = fixed_size_sources()
     header = sources["kinqp_status.h"]
-    solver_header = _INCLUDE.sub("", sources["kinqp_as.h"])
-    solver_source = _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources)
-    values = {
+    values: dict[str, Any] = {
         "p": code.prefix,
         "title": f"{code.formulation} on {code.robot}: {', '.join(mode.text for mode in code.modes)}",
         "summary": "One control cycle of a hand-guided arm: joint positions and hand velocity in, joint rates out.",
         "version": library_version(),
         "status_header": header,
         "math_header": math_header(),
-        "solver_header": solver_header,
-        "solver_source": solver_source,
-        "sizes": [{"n": n, "m": m} for n, m in code.sizes],
-        "largest": max(n for n, _ in code.sizes),
         "modes": code.modes,
-        "kernels": _kernels(code),
-        "joint_stride": padded(code.nv),
-        "row_stride": padded(code.rows),
         "parameters": code.parameters,
         "inputs": code.inputs,
         "nv": code.nv,
@@ -78,10 +69,25 @@ def render_step(code: StepCode) -> dict[str, str]:
         "brake": code.brake_body,
         "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
     }
+    values |= _of_one_qp(code, sources) if code.single else {"solver_source": embedded_source("KINQP_INLINE")}
+    source = "step.c.j2" if code.single else "cascade.c.j2"
     templates = environment()
     return {
         f"{code.prefix}.h": templates.get_template("step.h.j2").render(values),
-        f"{code.prefix}.c": templates.get_template("step.c.j2").render(values),
+        f"{code.prefix}.c": templates.get_template(source).render(values),
+    }
+
+
+def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
+    """What the source takes beside the rest where every mode is a single QP."""
+    return {
+        "solver_header": _INCLUDE.sub("", sources["kinqp_as.h"]),
+        "solver_source": _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources),
+        "sizes": [{"n": n, "m": m} for n, m in code.sizes],
+        "largest": max(n for n, _ in code.sizes),
+        "kernels": _kernels(code),
+        "joint_stride": padded(code.nv),
+        "row_stride": padded(code.rows),
     }
 
 
@@ -99,12 +105,12 @@ def math_header() -> str:
 
 def _kernels(code: StepCode) -> str:
     """Source of the kernels that any mode calls."""
-    names = ["common", *(kernel for mode in code.modes for kernel in mode.kernels)]
-    if any(mode.shape.diagonal for mode in code.modes):
+    names = ["common", *(kernel for mode in code.single for kernel in mode.kernels)]
+    if any(mode.shape.diagonal for mode in code.single):
         names.append("one_row")
-    if any(not mode.shape.diagonal for mode in code.modes):
+    if any(not mode.shape.diagonal for mode in code.single):
         names.append("cholesky")
-    if any(mode.m_eq for mode in code.modes):
+    if any(mode.m_eq for mode in code.single):
         names.append("null_space")
     return "\n".join(_template_text(f"kernels/{name}.h") for name in dict.fromkeys(names))
 

@@ -45,12 +45,14 @@ class TickResult(NamedTuple):
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Names of the rows that hold the command back, with their side: "joint limits[3] upper"."""
-        return tuple(
+        """Names of the rows that hold the command back, each once, with their side: "joint limits[3] upper"."""
+        names = (
             f"{name} {'upper' if side > 0 else 'lower'}"
             for name, side in zip(self.rows, self.sides, strict=True)
             if side
         )
+        # Levels of a hierarchy name the same limits.
+        return tuple(dict.fromkeys(names))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..formulations import InputError, Mode, check_input, get_formulation
+from ..formulations import Hierarchy, InputError, Mode, check_input, get_formulation
 from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
 from . import qrqp
-from .model import identifier, step_code
+from .fields import identifier
+from .model import step_code
 from .render import render_batch, render_step
 from .results import BatchResult, TickResult
 
@@ -105,6 +106,7 @@ class CompiledStep:
         self._shape_q: Final = self._q.shape
         self._shape_v: Final = self._v.shape
         self._rows: Final = code.modes[0].rows
+        self._quiet: Final = bool(code.single)
         self._qd: Final = self._view(self._output, "qd")
         self._eps: Final = self._view(self._output, "eps")
         self._sides: Final = self._view(self._output, "active", np.dtype(np.intc))
@@ -145,8 +147,8 @@ class CompiledStep:
             for name, values in (("q", self._q), ("v", self._v)):
                 check_input(self._specs[name], values, self.mode)
         iterations = output.iterations
-        # Without a step no row is active; and past NamedTuple's own constructor, which takes twice the time.
-        sides = self._sides.copy() if iterations else self._no_sides
+        # Without a step no row is active, unless equalities stand for it; and past NamedTuple's own constructor, which takes twice the time.
+        sides = self._sides.copy() if iterations or not self._quiet else self._no_sides
         return _new(TickResult, (self._qd.copy(), self._eps.copy(), STATUSES[code], iterations, sides, self._rows))
 
     def _run_with(self, inputs: dict[str, ArrayLike]) -> int:
@@ -295,6 +297,8 @@ def compile_step(
     if solver == qrqp.NAME and (feasible or max_iterations is not None):
         raise ValueError(f"feasible, max_iterations: expected neither with {solver}, which doesn't take them")
     made = get_formulation(formulation)
+    if solver == qrqp.NAME and isinstance(made, Hierarchy):
+        raise ValueError(f"solver: expected {SOLVER} for {made.name}, which is several QPs in order, got {solver!r}")
     if solver == qrqp.NAME and made.safe_stop != "zero":
         raise ValueError(f"solver: expected {SOLVER} for {made.name}, whose safe stop is braking, got {solver!r}")
     return CompiledStep(

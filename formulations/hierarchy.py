@@ -47,7 +47,7 @@ class Hierarchy(Formulation):
         names = " > ".join(level.name for level in self.levels)
         raise DeclarationError(
             f"{self.name}: expected a formulation of one QP, got {len(self.levels)} to solve in order ({names}); "
-            "make_step does that, there is no C for it"
+            "make_step, compile_step and export_c do that"
         )
 
 

@@ -3,7 +3,7 @@
 The C is plain C99 and can be used without Python; ``docs/active-set.md`` says how.
 """
 
-from .library import fixed_size_sources, sources
+from .library import embedded_source, fixed_size_sources, sources
 from .solver import STATUSES, ActiveSet
 
-__all__ = ["STATUSES", "ActiveSet", "fixed_size_sources", "sources"]
+__all__ = ["STATUSES", "ActiveSet", "embedded_source", "fixed_size_sources", "sources"]

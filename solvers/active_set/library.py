@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -28,6 +29,12 @@ _RUN_TIME = (
 _FIXED_SIZE = ("kinqp_status.h", "kinqp_as.h", "kinqp_as_fixed.h", "kinqp_as_factor.inc", "kinqp_as_core.inc")
 
 _HEADERS = ("kinqp_status.h", "kinqp_as.h", "kinqp_qp.h")
+
+_INCLUDE = re.compile(r'^#include "([^"]+)"\n', flags=re.MULTILINE)
+_SYSTEM = re.compile(r"^#include <[^>]+>\n", flags=re.MULTILINE)
+_FUNCTION = re.compile(r"^(?:int|void|double|size_t|kinqp_\w+) \*?kinqp_\w+\(", flags=re.MULTILINE)
+_LINKAGE_BEGIN = '#ifdef __cplusplus\nextern "C" {\n#endif\n\n'
+_LINKAGE_END = "#ifdef __cplusplus\n}\n#endif\n"
 
 
 def sources() -> dict[str, str]:
@@ -59,6 +66,28 @@ def load() -> tuple[Any, Any]:
     for header in _HEADERS:
         ffi.cdef(declarations(texts[header]))
     return ffi, ffi.dlopen(str(build_library("kinqp_active_set", texts)))
+
+
+def embedded_source(inline: str) -> str:
+    """Return the C of the solver for sizes known at run time as one text, all of its functions private.
+
+    Parameters
+    ----------
+    inline : str
+        What to declare every function as, such as "static inline". Some of them are not called by the others.
+    """
+    texts = sources()
+    order = ("kinqp_as.h", "kinqp_qp.h", "kinqp_qp_internal.h", *(name for name in _RUN_TIME if name.endswith(".c")))
+    text = "\n".join(texts[name] for name in order)
+    text = _INCLUDE.sub(lambda match: texts[match[1]] if match[1].endswith(".inc") else "", text)
+    text = _SYSTEM.sub("", text).replace(_LINKAGE_BEGIN, "").replace(_LINKAGE_END, "")
+    return _FUNCTION.sub(rf"{inline} \g<0>", text)
+
+
+def workspace_doubles(n: int, p: int, m: int) -> int:
+    """Return how many doubles `kinqp_qp_solve` works in, for n variables, p rows of A and m rows of C."""
+    _, lib = load()
+    return -(-int(lib.kinqp_qp_workspace_size(n, p, m)) // 8)
 
 
 def _read(names: tuple[str, ...]) -> dict[str, str]:

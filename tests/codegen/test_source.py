@@ -13,7 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from kinqp.codegen import compile_step
-from kinqp.codegen.model import StepCode, identifier, step_code
+from kinqp.codegen.fields import identifier
+from kinqp.codegen.model import StepCode, step_code
 from kinqp.codegen.render import render_step
 from kinqp.codegen.step import STEP_FLAGS
 from kinqp.formulations import Mode, get_formulation
