@@ -116,6 +116,7 @@ def identifier(text: str) -> str:
 
 
 def field_of(given: Input) -> Field:
+    """Return the struct field that a run-time input is read from."""
     default = given.default if given.default is not None else [0.0] * given.size
     comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')} [{given.unit}]"
     array = given.size > 1 or given.name in SIGNALS or given.name in ("task_weight", "joint_weight")
@@ -123,6 +124,7 @@ def field_of(given: Input) -> Field:
 
 
 def sources_of(fields: Mapping[str, Field]) -> dict[str, str]:
+    """Return C expressions of the arrays that run-time inputs are read from, by name."""
     # A parameter that is a plain number is read through its address, as an array of one.
     return {
         name: f"in->{name}" if name in SIGNALS else f"p->{name}" if field.array else f"(&p->{name})"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from ..formulations import Hierarchy, levels_of, lower
-from .definite import require_definite
 from .cascade import cascade_code
+from .definite import require_definite
 from .emit import emit, needed_for
 from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
 from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
@@ -28,6 +28,8 @@ _PADDED: Final = ("A", "J")
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
 _LATE: Final = ("C", "start")
+
+
 @dataclass(frozen=True)
 class Shape:
     """What is known of a mode's QP whatever the numbers, and saves work in its code.

@@ -147,7 +147,8 @@ class CompiledStep:
             for name, values in (("q", self._q), ("v", self._v)):
                 check_input(self._specs[name], values, self.mode)
         iterations = output.iterations
-        # Without a step no row is active, unless equalities stand for it; and past NamedTuple's own constructor, which takes twice the time.
+        # Without a step no row is active, unless a solver takes rows for equalities; and past NamedTuple's own
+        # constructor, which takes twice the time.
         sides = self._sides.copy() if iterations or not self._quiet else self._no_sides
         return _new(TickResult, (self._qd.copy(), self._eps.copy(), STATUSES[code], iterations, sides, self._rows))
 

@@ -34,8 +34,8 @@ class Hierarchical(Hierarchy):
 
     It is what `joint-space` tends to as its joint weight goes to zero, without that weight's share of the task and
     its flat QPs' loss of digits: the task level has many minimisers, and the posture level picks one. Nothing protects
-    from singularities: pulled outwards at the stretched arm the LBR's joints chatter between their bounds. Solved by
-    `kinqp.control.make_step`; not generated as C.
+    from singularities: pulled outwards at the stretched arm the LBR's joints chatter between their bounds. Generated C
+    solves both levels by the general solver that `make_step` uses: slower than the C of a single QP.
 
     Run-time parameters
     -------------------

@@ -125,10 +125,6 @@ def test_export_writes_a_folder_and_says_what_next(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "ctest --test-dir" in done.stdout.replace("\n", " ")
     assert (out / "kinqp_lbr_med14_cartesian_error.c").exists()
-    cascade = kinqp("export", "--robot", "lbr_med14", *options[:1], "hierarchical", *options[2:])
-    assert cascade.returncode == 2
-    assert "make_step does that, there is no C for it" in cascade.stderr.replace("\n", " ")
-    assert "Traceback" not in cascade.stderr
     wrong = kinqp("export", "--robot", "lbr_med41", *options)
     assert wrong.returncode == 2
     assert "lbr_med14" in wrong.stderr

@@ -45,6 +45,7 @@ CASES = [
     ("joint-space", ("fix-orientation",), "lbr_med14"),
     ("cartesian-error", ("line:z", "fix-position", "rcm:-0.1"), "lbr_med14"),
     ("joint-space", ("plane:0,1,0",), "ur5"),
+    ("hierarchical", ("fix-orientation", "free"), "lbr_med14"),
 ]
 
 
