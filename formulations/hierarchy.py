@@ -24,7 +24,7 @@ class Hierarchy(Formulation):
 
     A level is an ordinary formulation. From the second one on it takes the command of the level above as a run-time
     input (`command_above`), and it is its own business to leave alone what that level has decided; the last level's
-    command is sent. `make_step`, `compile_step` and `export_c` take the levels in order. It is not one QP, and so not to be
+    command is sent. `make_step`, `compile_step` and `export_c` take the levels in order. It is not one QP and not to be
     lowered as one; each of its levels is.
 
     A subclass is a frozen dataclass that gives `name` and `levels`.

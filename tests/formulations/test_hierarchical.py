@@ -185,8 +185,8 @@ def test_a_level_that_fails_stops_the_robot(good: int, level: str) -> None:
 
 
 SENTENCE = (
-    r"hierarchical: expected a formulation of one QP, got 2 to solve in order \(task > posture\); make_step, compile_step "
-    "and export_c do that"
+    r"hierarchical: expected a formulation of one QP, got 2 to solve in order \(task > posture\); make_step, "
+    "compile_step and export_c do that"
 )
 
 
