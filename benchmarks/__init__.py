@@ -3,7 +3,7 @@
 from .conditions import conditions
 from .config import ConfigError, SweepConfig, load_config, make_config
 from .metrics import ON_LIMIT, CellMetrics, Spread, cell_metrics
-from .scenarios import Scenario, available_scenarios, get_scenario
+from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
 from .store import Cell, Store, StoreError, cells_of
 from .sweep import sweep, timed_run
 from .table import TABLE_WIDTH, sweep_table
@@ -14,8 +14,11 @@ __all__ = [
     "Cell",
     "CellMetrics",
     "ConfigError",
+    "Phase",
     "Scenario",
+    "ScenarioError",
     "Spread",
+    "States",
     "Store",
     "StoreError",
     "SweepConfig",

@@ -103,7 +103,7 @@ def cell_metrics(frame: pl.DataFrame, scenario: Scenario) -> CellMetrics:
     scenario : Scenario
         What was run.
     """
-    robot, joint = scenario.robot, scenario.watched_joint
+    robot, joint = scenario.robot, scenario.watched_joints[0]
     q, qd = frame["q"].to_numpy(), frame["qd"].to_numpy()
     setup, solve = frame["setup_time"].to_numpy(), frame["solve_time"].to_numpy()
     acceleration = np.abs(np.diff(qd, axis=0, prepend=0.0)) / scenario.dt / robot.qdd_max

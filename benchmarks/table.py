@@ -58,7 +58,7 @@ def sweep_table(store: Store) -> RenderableType:
 def _scenario_table(scenario: Scenario, rows: list[tuple[Cell, CellMetrics]]) -> Table:
     ticks = rows[0][1].ticks
     runs = sorted({metrics.repeats for _, metrics in rows})
-    joint = scenario.watched_joint + 1
+    joint = scenario.watched_joints[0] + 1
     table = Table(
         title=f"{scenario.name}: {scenario.robot.name}, {scenario.mode}, {ticks} ticks of {1e3 * scenario.dt:g} ms, "
         f"{' to '.join(map(str, {runs[0], runs[-1]}))} runs, watched: joint {joint}",

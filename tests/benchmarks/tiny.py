@@ -6,4 +6,5 @@ from kinqp.benchmarks import Scenario, get_scenario
 
 
 def tiny() -> Scenario:
-    return replace(get_scenario("semicircle"), name="tiny", duration=0.02)
+    scenario = get_scenario("semicircle")
+    return replace(scenario, name="tiny", phases=(replace(scenario.only_phase, duration=0.02),))
