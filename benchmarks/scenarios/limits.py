@@ -24,7 +24,8 @@ SLOWEST: Final = 0.05
 def limit_corner() -> Scenario:
     """Pull the tool to where elbow and sixth joint both meet their limits, on along them sideways, and back out.
 
-    In the arm's plane the corner holds the tool altogether; sideways it is free, and must stay so.
+    In the arm's plane the corner holds the tool altogether. Sideways, where the hand always pulls a little too, the
+    tool is free, and must stay so.
     """
     robot = load_robot("lbr_med14")
     corner = np.deg2rad(CORNER_DEG)
@@ -33,7 +34,10 @@ def limit_corner() -> Scenario:
     inwards /= np.linalg.norm(inwards)
     sideways = np.array([0.0, 1.0, 0.0])
     hand = strokes(
-        pull(inwards, SPEED, 0.06), pull(inwards + sideways, SPEED, 0.06), pull(-inwards, SPEED, 0.03), rest()
+        pull(inwards + 0.3 * sideways, SPEED, 0.06),
+        pull(inwards + sideways, SPEED, 0.06),
+        pull(-inwards + 0.3 * sideways, SPEED, 0.03),
+        rest(),
     )
     return Scenario(
         name="limit-corner",

@@ -46,13 +46,15 @@ def random_states(seed: int = 0, count: int = 600) -> Scenario:
     mode = Mode.fix_orientation()
     rng = np.random.default_rng(seed)
     shape = (count, robot.nv)
-    q = rng.uniform(robot.q_min, robot.q_max, size=shape)
-    distance = np.exp(rng.uniform(*np.log(NEAR), size=shape))
+    q = robot.q_min + (robot.q_max - robot.q_min) * rng.random(shape)
+    nearest, furthest = np.log(NEAR)
+    distance = np.exp(nearest + (furthest - nearest) * rng.random(shape))
     near, low = rng.random(shape) < NEAR_SHARE, rng.random(shape) < 0.5
     q = np.where(near, np.where(low, robot.q_min + distance, robot.q_max - distance), q)
     v = rng.normal(size=(count, mode.m_free))
     v *= rng.uniform(0.0, FASTEST, size=(count, 1)) / np.linalg.norm(v, axis=1, keepdims=True)
-    qd_prev = rng.uniform(-_fastest(q - robot.q_min, robot), _fastest(robot.q_max - q, robot))
+    down, up = _fastest(q - robot.q_min, robot), _fastest(robot.q_max - q, robot)
+    qd_prev = (down + up) * rng.random(shape) - down
     return Scenario(
         name="random-states",
         description="i.i.d. states near joint limits, seeded; orientation fixed",

@@ -42,12 +42,16 @@ def drill_line() -> Scenario:
 
 
 def rcm_pivot() -> Scenario:
-    """Turn a tool that has passed a trocar about it in a figure of eight, and pull it out by 2 cm."""
+    """Turn a tool that has passed a trocar about it, one way, another and back, and pull it out by 1.6 cm.
+
+    The pivot is a point of the tool. Drawing the tool back takes that point with it, so that it is done last: turned
+    after that, the tool would turn about a point outside the trocar.
+    """
     tilt, roll = 0.5, 0.4
     hand = strokes(
         Stroke((0.0, 0.0, 0.0, tilt, 0.0, roll), 0.4, "tool"),
-        Stroke((0.0, 0.0, -0.08, 0.0, tilt, -roll), 0.4, "tool"),
-        Stroke((0.0, 0.0, 0.0, -tilt, -tilt, 0.0), 0.4, "tool"),
+        Stroke((0.0, 0.0, 0.0, -tilt, tilt, -roll), 0.4, "tool"),
+        Stroke((0.0, 0.0, -0.08, 0.0, 0.0, 0.0), 0.35, "tool"),
         rest(),
     )
     return _scenario(

@@ -1,49 +1,19 @@
-"""What a cell's ticks say: iterations, times, errors, limits."""
+"""One row of the sweep's table: iterations, times, errors, limits."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .motion import ON_LIMIT
+from .spread import Spread
+
 if TYPE_CHECKING:
     import polars as pl
-    from numpy.typing import NDArray
 
-    from .scenarios import Scenario
-
-    Array = NDArray[np.float64]
-
-# How close to its limit a joint counts as being on it [rad or m].
-ON_LIMIT: Final = 1e-6
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A distribution.
-
-    Attributes
-    ----------
-    samples : int
-        How many values it is made of.
-    mean, std, p50, p95, p99, max : float
-        Percentiles are values that occurred (the next one up), not interpolations.
-    """
-
-    samples: int
-    mean: float
-    std: float
-    p50: float
-    p95: float
-    p99: float
-    max: float
-
-    @classmethod
-    def of(cls, values: Array) -> Spread:
-        """Sum up values of any shape; at least one."""
-        p50, p95, p99 = (float(x) for x in np.percentile(values, [50, 95, 99], method="inverted_cdf"))
-        return cls(values.size, float(values.mean()), float(values.std()), p50, p95, p99, float(values.max()))
+    from ..scenarios import Scenario
 
 
 @dataclass(frozen=True)
