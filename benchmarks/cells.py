@@ -5,7 +5,12 @@ from __future__ import annotations
 import hashlib
 import re
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+from ..solvers import get_solver
+
+if TYPE_CHECKING:
+    from ..solvers import Solver
 
 #: How a solver starts: from nothing, from the last active set, from the last solution.
 STARTS: Final = ("cold", "active-set", "solution")
@@ -53,6 +58,12 @@ class Cell:
     def file_stem(self) -> str:
         """Name of its files, without what is put behind: readable, and different for different cells."""
         return _file_stem(self.scenario, self.formulation, self.solver, self.start)
+
+
+def solver_of(cell: Cell) -> Solver:
+    """Make a cell's solver, with the options that give it the cell's start."""
+    solver = get_solver(cell.solver)
+    return solver if cell.start == "cold" else get_solver(cell.solver, **solver.starts[cell.start])
 
 
 def _file_stem(*parts: str) -> str:

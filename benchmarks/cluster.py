@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import sys
 import threading
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final
 
@@ -46,7 +47,7 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
     """
     if find_spec("distributed") is None:
         raise ClusterError("--scheduler needs Dask: pip install 'kinqp[cluster]'")
-    import distributed
+    distributed: Any = import_module("distributed")  # which is not typed throughout
 
     try:
         client: Any = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
@@ -78,9 +79,7 @@ def _result(future: Any, task: Task) -> Ran | Recorded:
     if error is None:
         found: Ran | Recorded = future.result()
         return found
-    from distributed import KilledWorker
-
-    if not isinstance(error, KilledWorker):
+    if not isinstance(error, import_module("distributed").KilledWorker):
         raise error
     # Our own processes shield the workers from solvers: that one after the other was lost is the cluster's doing.
     reason = f"the cluster lost one worker after the other with it: {error}"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 import tomllib
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from importlib.resources import files
+from typing import TYPE_CHECKING, Annotated, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
+from .. import configs
 from ..formulations import available_formulations, get_formulation
 from ..solvers import available_solvers, get_solver
+from ..solvers.plugins import PluginError
 from .cells import STARTS, Cell
 from .scenarios import available_scenarios, get_scenario
 
@@ -40,10 +43,13 @@ class Product(BaseModel):
         At least one each.
     starts : tuple of {"cold", "active-set", "solution"}
         How the solvers start. Starts that a solver does not have are left out, and named in the manifest.
+    skip_missing : bool
+        Whether solvers that are not installed are left out, and named in the manifest, instead of being an error.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    skip_missing: bool = False
     scenarios: Names = ("semicircle",)
     formulations: Names = ("cartesian-error", "joint-space")
     solvers: Names = ("active-set", "thesis-active-set", "clarabel", "piqp")
@@ -51,11 +57,11 @@ class Product(BaseModel):
 
     @field_validator("scenarios", "formulations", "solvers", mode="after")
     @classmethod
-    def _expanded(cls, names: tuple[str, ...], info: Any) -> tuple[str, ...]:
+    def _expanded(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         if ALL not in names:
             return names
         # What is named beside "all" is meant beside it: a solver with options, a module's own.
-        everything = CHOICES[info.field_name]()
+        everything = CHOICES[str(info.field_name)]()
         return (*everything, *(name for name in names if name != ALL and name not in everything))
 
     @field_validator("scenarios", "formulations", "solvers", "starts")
@@ -82,9 +88,10 @@ class Product(BaseModel):
 
     @field_validator("solvers")
     @classmethod
-    def _solvers_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _solvers_exist(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            starts_of(name)
+            if not (info.data.get("skip_missing") and missing(name)):
+                starts_of(name)
         return names
 
     @field_validator("starts")
@@ -97,16 +104,20 @@ class Product(BaseModel):
 
     def cells(self) -> tuple[Cell, ...]:
         """Its cells in the order of its lists."""
-        return tuple(Cell(*names) for names in self._combined() if names[3] in starts_of(names[2]))
+        return tuple(Cell(*names) for names in self._combined() if names[3] in self._starts(names[2]))
 
     def skipped(self) -> dict[str, str]:
         """What is left out of the product, as "solver from last start", and why."""
-        return {
+        without = {solver: why for solver in self.solvers if (why := missing(solver))}
+        return without | {
             f"{solver} from last {start}": f"{solver} starts {', '.join(starts_of(solver))} only"
             for solver in self.solvers
             for start in self.starts
-            if start not in starts_of(solver)
+            if solver not in without and start not in starts_of(solver)
         }
+
+    def _starts(self, solver: str) -> tuple[str, ...]:
+        return () if missing(solver) else starts_of(solver)
 
     def _combined(self) -> list[tuple[str, str, str, str]]:
         return [
@@ -156,9 +167,10 @@ class SweepConfig(Product):
 
     @field_validator("sampled")
     @classmethod
-    def _sampled_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _sampled_exist(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            starts_of(name)
+            if not (info.data.get("skip_missing") and missing(name)):
+                starts_of(name)
         return names
 
     def products(self) -> tuple[Product, ...]:
@@ -196,6 +208,18 @@ def starts_of(solver: str) -> tuple[str, ...]:
         raise ValueError(str(error)) from error
 
 
+@cache
+def missing(solver: str) -> str:
+    """Say why there is no such solver here; empty where there is one, whatever its options."""
+    try:
+        get_solver(solver)
+    except PluginError as error:
+        return str(error)
+    except (TypeError, ValueError):
+        return ""
+    return ""
+
+
 CHOICES: Final[dict[str, Callable[[], tuple[str, ...]]]] = {
     "scenarios": available_scenarios,
     "formulations": available_formulations,
@@ -206,6 +230,8 @@ CHOICES: Final[dict[str, Callable[[], tuple[str, ...]]]] = {
 def load_config(path: Path | None = None) -> SweepConfig:
     """Read a sweep from a TOML file; without one, the shipped default.
 
+    Where there is no such file, ``configs/full.toml`` and the like are those that came with the library.
+
     Raises
     ------
     ConfigError
@@ -214,11 +240,18 @@ def load_config(path: Path | None = None) -> SweepConfig:
     if path is None:
         return SweepConfig()
     try:
-        text = path.read_text(encoding="utf-8")
+        text = _shipped(path) or path.read_text(encoding="utf-8")
         given = tomllib.loads(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"{path}: expected a readable TOML file: {error}") from error
     return make_config(given, str(path), text)
+
+
+def _shipped(path: Path) -> str | None:
+    shipped = files(configs).joinpath(path.name)
+    if path.exists() or path.parent.name != "configs" or not shipped.is_file():
+        return None
+    return shipped.read_text(encoding="utf-8")
 
 
 def make_config(given: dict[str, object], source: str = "sweep", text: str = "") -> SweepConfig:

@@ -46,7 +46,10 @@ class Worker:
 
     def problems(self, block: Block, config: SweepConfig) -> bytes | Refused:
         """Make a block ready and return its recorded problems; `Refused` says why it can't be."""
-        return self._retried(lambda: self._ask(Prepare(block, config, problems=True), _PREPARE_TIMEOUT))
+        answer: bytes | Refused = self._retried(
+            lambda: self._ask(Prepare(block, config, problems=True), _PREPARE_TIMEOUT)
+        )
+        return answer
 
     def run(self, cell: Cell, config: SweepConfig) -> Ran:
         """Run the accuracy part of a cell; whatever happens to the process is this cell's end at worst."""

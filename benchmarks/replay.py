@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
-from ..solvers import get_solver
+from .cells import solver_of
 from .problems import Window
 from .store import Part
 from .timing_c import c_replay
@@ -45,9 +45,7 @@ class TimedCell:
     def __init__(self, cell: Cell, problems: Problems, config: SweepConfig) -> None:
         self.cell: Final = cell
         self._problems: Final = problems
-        self._solver: Final = get_solver(cell.solver)
-        if cell.start != "cold":
-            self._solver = get_solver(cell.solver, **self._solver.starts[cell.start])
+        self._solver: Final = solver_of(cell)
         self._c: Final = c_replay(self._solver)
         self._frames: Final[list[pl.DataFrame]] = []
         self._first: list[Array] | None = None

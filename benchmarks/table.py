@@ -66,8 +66,8 @@ def _scenario_table(scenario: Scenario, rows: list[tuple[Cell, CellSummary]]) ->
     joints = ", ".join(str(joint + 1) for joint in scenario.watched_joints) or "none"
     length = "states" if scenario.states is not None else f"ticks of {1e3 * scenario.dt:g} ms"
     table = Table(
-        title=f"{scenario.name}: {scenario.robot.name}, {', '.join(map(str, scenario.modes))}, {scenario.ticks} {length}, "
-        f"watched joints: {joints}",
+        title=f"{scenario.name}: {scenario.robot.name}, {', '.join(map(str, scenario.modes))}, {scenario.ticks} "
+        f"{length}, watched joints: {joints}",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
         padding=(0, 1, 0, 0),
