@@ -1,13 +1,12 @@
 """Metrics: a cell's two frames and its scenario summed up in one flat record, and records compared."""
 
 from .behaviour import AGREEMENT, Answers, Errors, Iterations, Motion
-from .cell import CellMetrics, cell_metrics
+from .intervals import Estimate
 from .motion import CHATTER_SHARE, JUMP_SHARE, ON_LIMIT
 from .ratios import SAME_PROBLEMS, RecordsError, geometric_means, performance_profile
 from .record import CellRecord, cell_record
 from .requirements import REQUIREMENTS, Requirement
-from .scorecard import scorecard_of
-from .spread import Estimate, Spread
+from .scorecard import records, scorecard, scorecard_of
 from .ticks import FrameError, Ticks
 from .timing import CellTimes, TimeSpread
 
@@ -19,7 +18,6 @@ __all__ = [
     "REQUIREMENTS",
     "SAME_PROBLEMS",
     "Answers",
-    "CellMetrics",
     "CellRecord",
     "CellTimes",
     "Errors",
@@ -29,12 +27,12 @@ __all__ = [
     "Motion",
     "RecordsError",
     "Requirement",
-    "Spread",
     "Ticks",
     "TimeSpread",
-    "cell_metrics",
     "cell_record",
     "geometric_means",
     "performance_profile",
+    "records",
+    "scorecard",
     "scorecard_of",
 ]

@@ -32,7 +32,7 @@ class Iterations:
     iterations_mean, iterations_p99, iterations_max : float
         Per tick, as the solver counts them; None where it tells none.
     changes_mean, changes_p99, changes_max : float
-        Rows that joined or left the active set from one tick to the next.
+        Rows that joined or left the active set from one tick to the next; None of a sample, whose ticks are far apart.
     """
 
     iterations_mean: float | None
@@ -48,7 +48,8 @@ class Iterations:
         counts = ticks.column("iterations")
         known = bool(np.all(counts >= 0))
         active = [frozenset(names or ()) for names in ticks.frame["active"].to_list()]
-        changes = np.array([len(a ^ b) for a, b in pairwise(active)], dtype=float)
+        in_order = [] if ticks.loop == "sampled" else pairwise(active)
+        changes = np.array([len(a ^ b) for a, b in in_order], dtype=float)
         return cls(*_mean_p99_max(counts if known else np.zeros(0)), *_mean_p99_max(changes))
 
 
@@ -170,7 +171,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Motion:
-    """What the joints did. Of states that have nothing to do with each other all but the first three are None.
+    """What the joints did. All but the first three are None where it was no closed loop.
 
     Attributes
     ----------

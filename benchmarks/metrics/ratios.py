@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
-from .spread import CONFIDENCE, RESAMPLES
+from .intervals import CONFIDENCE, RESAMPLES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

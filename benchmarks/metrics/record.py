@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .behaviour import Answers, Errors, Iterations, Motion
+from .intervals import Estimate
 from .requirements import requirement_values
-from .spread import Estimate
 from .ticks import Ticks
 from .timing import CellTimes
 
@@ -31,10 +29,9 @@ class CellRecord:
         The scenario's right answer.
     ticks : int
         Of its accuracy part.
-    setup_p50, setup_max : float
-        Times of set-ups in the accuracy part: the first tick's, and those after a failed tick [s].
-    setups : int
-        How many there were.
+    loop : {"closed", "states", "sampled"}
+        Whether they are the solver's own closed loop, states that have nothing to do with each other, or a sample of
+        the reference's states.
     times : CellTimes
     iterations : Iterations
     answers : Answers
@@ -50,9 +47,7 @@ class CellRecord:
     start: str
     expects: str
     ticks: int
-    setup_p50: float | None
-    setup_max: float | None
-    setups: int
+    loop: str
     times: CellTimes
     iterations: Iterations
     answers: Answers
@@ -102,8 +97,6 @@ def cell_record(
         When a column is missing, or the rows are not the scenario's ticks.
     """
     cell = Ticks(scenario, ticks)
-    setup = cell.column("setup_time")
-    setup = setup[np.isfinite(setup) & (setup > 0.0)]
     return CellRecord(
         scenario=scenario.name,
         formulation=formulation,
@@ -111,9 +104,7 @@ def cell_record(
         start=start,
         expects=scenario.expects.value,
         ticks=len(ticks),
-        setup_p50=float(np.percentile(setup, 50, method="inverted_cdf")) if setup.size else None,
-        setup_max=float(setup.max()) if setup.size else None,
-        setups=int(setup.size),
+        loop=cell.loop,
         times=CellTimes.of(times, seed=seed),
         iterations=Iterations.of(cell),
         answers=Answers.of(cell),

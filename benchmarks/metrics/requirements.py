@@ -140,10 +140,12 @@ def drift(ticks: Ticks) -> float | None:
 
 def velocity_limits(ticks: Ticks) -> float | None:
     """How often a velocity limit that is reached is broken or stops the arm."""
+    if not ticks.closed_loop:
+        return None
     limit = ticks.limit("qd_max")
     fastest = np.maximum(np.abs(ticks.qd), np.abs(ticks.qd_before))
     reached = np.any(fastest >= AT_SPEED * limit, axis=1)
-    if not (ticks.closed_loop and reached.any()):
+    if not reached.any():
         return None
     wrong = np.any(np.abs(ticks.qd) > limit + SPEED_TOLERANCE, axis=1) | (ticks.words("status") != Status.SOLVED.value)
     return float(np.mean(wrong[reached]))

@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Final
 
 import polars as pl
 
+from ..scenarios import get_scenario
 from .ratios import RecordsError
+from .record import cell_record
 from .requirements import REQUIREMENTS
 
 if TYPE_CHECKING:
+    from ..store import Store
     from .requirements import Requirement
 
 _CONTROLLER: Final = ("formulation", "solver", "start")
@@ -17,12 +20,41 @@ _CONTROLLER: Final = ("formulation", "solver", "start")
 _RELATIVE: Final = "workspace"
 
 
-def scorecard_of(records: pl.DataFrame) -> pl.DataFrame:
+def records(store: Store) -> pl.DataFrame:
+    """Make the records of all cells of a sweep that have been run, one row each; see `CellRecord`.
+
+    Parameters
+    ----------
+    store : Store
+        The results folder.
+    """
+    rows = [
+        cell_record(
+            store.ticks(cell), store.times(cell), get_scenario(cell.scenario),
+            formulation=cell.formulation, solver=cell.solver, start=cell.start,
+        ).flat() | {"scenario": cell.scenario}
+        for cell in store.cells()
+    ]  # fmt: skip
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def scorecard(store: Store) -> pl.DataFrame:
+    """Give the scorecard of a sweep; see `scorecard_of`.
+
+    Parameters
+    ----------
+    store : Store
+        The results folder.
+    """
+    return scorecard_of(records(store))
+
+
+def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
     """Give the scorecard of a sweep's records.
 
     Parameters
     ----------
-    records : pl.DataFrame
+    cells : pl.DataFrame
         One row per cell, as of `CellRecord.flat`.
 
     Returns
@@ -39,16 +71,16 @@ def scorecard_of(records: pl.DataFrame) -> pl.DataFrame:
         When a column is missing.
     """
     for name in (*_CONTROLLER, "scenario", *(f"requirement_{each.key}" for each in REQUIREMENTS)):
-        if name not in records.columns:
-            raise RecordsError(f"records: expected a column {name!r}, got {', '.join(records.columns)}")
+        if name not in cells.columns:
+            raise RecordsError(f"records: expected a column {name!r}, got {', '.join(cells.columns)}")
     own = f"requirement_{_RELATIVE}"
-    records = records.with_columns(pl.col(own) / pl.col(own).max().over("scenario"))
+    cells = cells.with_columns(pl.col(own) / pl.col(own).max().over("scenario"))
     rows = []
-    for key, cells in records.group_by(_CONTROLLER, maintain_order=True):
+    for key, group in cells.group_by(_CONTROLLER, maintain_order=True):
         row: dict[str, object] = dict(zip(_CONTROLLER, key, strict=True))
-        row["scenarios"] = cells["scenario"].n_unique()
+        row["scenarios"] = group["scenario"].n_unique()
         for each in REQUIREMENTS:
-            row |= _worst(each, cells)
+            row |= _worst(each, group)
         verdicts = [row[f"{each.key}_pass"] for each in REQUIREMENTS]
         row |= {"passed": verdicts.count(True), "measured": len(verdicts) - verdicts.count(None)}
         rows.append(row)

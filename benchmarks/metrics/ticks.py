@@ -67,15 +67,29 @@ class Ticks:
     frame: pl.DataFrame
 
     def __post_init__(self) -> None:
-        if len(self.frame) != self.scenario.ticks:
+        count = len(self.frame)
+        if not 0 < count <= self.scenario.ticks:
             raise FrameError(
-                f"ticks: expected {self.scenario.ticks} rows for scenario {self.scenario.name!r}, got {len(self.frame)}"
+                f"ticks: expected 1 to {self.scenario.ticks} rows for scenario {self.scenario.name!r}, got {count}"
             )
+
+    @cached_property
+    def loop(self) -> str:
+        """Say what one tick has to do with the next.
+
+        "closed": it leads to it. "states": nothing, all of the scenario's states are there. "sampled": nothing, they
+        are some of those of a closed loop.
+        """
+        if self.scenario.states is not None:
+            return "states"
+        t = self.column("t")
+        complete = len(t) == self.scenario.ticks and np.allclose(t, np.arange(len(t)) * self.scenario.dt)
+        return "closed" if complete else "sampled"
 
     @property
     def closed_loop(self) -> bool:
         """Whether one tick leads to the next."""
-        return self.scenario.states is None
+        return self.loop == "closed"
 
     def column(self, name: str) -> Array:
         """Return a column as floats, NaN for null: shape (N,), or (N, k) where its entries are vectors of length k.
@@ -116,14 +130,14 @@ class Ticks:
 
     @cached_property
     def qd_before(self) -> Array:
-        """Commands of the ticks before, from rest, shape (N, nv) [rad/s or m/s]."""
-        if self.scenario.states is not None:
-            return self.scenario.states.qd_prev
+        """Commands of the ticks before, from rest, shape (N, nv) [rad/s or m/s]; of a closed loop."""
+        if not self.closed_loop:
+            raise ValueError(f"ticks: expected a closed loop, in which one command follows another, got {self.loop}")
         return np.vstack([np.zeros((1, self.qd.shape[1])), self.qd[:-1]])
 
     @cached_property
     def acceleration(self) -> Array:
-        """Change of the command over one period, as shares of `qdd_max`, shape (N, nv)."""
+        """Change of the command over one period, as shares of `qdd_max`, shape (N, nv); of a closed loop."""
         change: Array = (self.qd - self.qd_before) / self.scenario.dt / self.limit("qdd_max")
         return change
 
@@ -138,10 +152,7 @@ class Ticks:
     @cached_property
     def phase(self) -> NDArray[np.int64]:
         """Number of each tick's phase, shape (N,); zero for states."""
-        if not self.closed_loop:
-            return np.zeros(len(self.frame), dtype=np.int64)
-        counts = [round(phase.duration / self.scenario.dt) for phase in self.scenario.phases]
-        return np.repeat(np.arange(len(counts)), counts)
+        return self.column("phase").astype(np.int64)
 
     @cached_property
     def switched(self) -> Flags:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .spread import Estimate, clusters, percentiles
+from .intervals import Estimate, clusters, percentiles
 from .ticks import FrameError
 
 if TYPE_CHECKING:
@@ -71,9 +71,11 @@ class CellTimes:
     Attributes
     ----------
     wall : TimeSpread
-        Update and solve together, through Python.
+        Update and solve together, through Python; of ticks that followed another, whose set-up was kept.
     update, solve : TimeSpread
         The same apart.
+    setup : TimeSpread
+        Full set-ups, without the solve, through Python.
     own : TimeSpread
         By the solver's own timer.
     c : TimeSpread
@@ -83,6 +85,7 @@ class CellTimes:
     wall: TimeSpread
     update: TimeSpread
     solve: TimeSpread
+    setup: TimeSpread
     own: TimeSpread
     c: TimeSpread
 
@@ -96,12 +99,15 @@ class CellTimes:
             When a column is missing.
         """
         if times is None or not len(times):
-            return cls(*[TimeSpread(0, 0)] * 5)
-        for name in ("tick", "repeat", "wall_update", "wall_solve", "own", "c"):
+            return cls(*[TimeSpread(0, 0)] * 6)
+        for name in ("tick", "repeat", "wall_setup", "wall_update", "wall_solve", "own", "c"):
             if name not in times.columns:
                 raise FrameError(f"times: expected a column {name!r}, got {', '.join(times.columns)}")
         tick, repeat = (times[name].to_numpy().astype(np.int64) for name in ("tick", "repeat"))
-        update, solve, own, c = (
-            np.array(times[name].to_list(), dtype=float) for name in ("wall_update", "wall_solve", "own", "c")
+        setup, update, solve, own, c = (
+            np.array(times[name].to_list(), dtype=float)
+            for name in ("wall_setup", "wall_update", "wall_solve", "own", "c")
         )
-        return cls(*(TimeSpread.of(x, tick, repeat, seed=seed) for x in (update + solve, update, solve, own, c)))
+        solve = np.where(np.isfinite(update), solve, np.nan)
+        columns = (update + solve, update, solve, setup, own, c)
+        return cls(*(TimeSpread.of(column, tick, repeat, seed=seed) for column in columns))

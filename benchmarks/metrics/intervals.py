@@ -1,4 +1,4 @@
-"""Distributions in a few numbers, with intervals that say how far to believe them."""
+"""Percentiles with intervals that say how far to believe them."""
 
 from __future__ import annotations
 
@@ -23,33 +23,6 @@ ENOUGH_REPEATS: Final = 8
 # Samples of a block, at least: longer than what a scheduler's tick or a cold cache leaves behind. And blocks, at most.
 BLOCK: Final = 50
 MOST_BLOCKS: Final = 100
-
-
-@dataclass(frozen=True)
-class Spread:
-    """A distribution.
-
-    Attributes
-    ----------
-    samples : int
-        How many values it is made of.
-    mean, std, p50, p95, p99, max : float
-        Percentiles are values that occurred (the next one up), not interpolations.
-    """
-
-    samples: int
-    mean: float
-    std: float
-    p50: float
-    p95: float
-    p99: float
-    max: float
-
-    @classmethod
-    def of(cls, values: Array) -> Spread:
-        """Sum up values of any shape; at least one."""
-        p50, p95, p99 = (float(x) for x in np.percentile(values, [50, 95, 99], method="inverted_cdf"))
-        return cls(values.size, float(values.mean()), float(values.std()), p50, p95, p99, float(values.max()))
 
 
 @dataclass(frozen=True)
