@@ -101,7 +101,7 @@ def test_corner_holds_two_joints_at_once_and_lets_go(formulation: str) -> None:
     # Sideways the tool is free, and in the end both joints are off their limits.
     speed = np.array([np.max(np.abs(qd)) for qd in made.qd])
     sideways = both & np.array([abs(v[1]) > 0.1 for v in made.v])
-    assert np.sum(sideways) > 200
+    assert np.sum(sideways) > 150
     assert np.min(speed[sideways]) > 0.01
     assert np.all(made.distance[-1, [3, 5]] > np.deg2rad(0.3))
 
