@@ -73,3 +73,9 @@ def times_frame(repeats: int, update: list[float], solve: list[float], **columns
         "c": [None] * (ticks * repeats),
     }
     return pl.DataFrame(whole | columns)
+
+
+def corner() -> Scenario:
+    """`limit-corner` up to where the hand pulls sideways."""
+    whole = get_scenario("limit-corner")
+    return replace(whole, name="corner", phases=(replace(whole.only_phase, duration=0.7),))
