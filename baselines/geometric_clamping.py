@@ -44,7 +44,7 @@ class GeometricClamping(Baseline):
         directions = critical_directions(at)
         held = np.zeros(at.nv)
         velocity = directions.wanted
-        for iteration in range(1, at.nv + 2):
+        for _ in range(at.nv + 1):
             qd = directions.command(velocity)
             over = np.where(held == 0.0, at.over(qd, OVER), 0.0)
             worst = int(np.argmax(over))
@@ -53,4 +53,4 @@ class GeometricClamping(Baseline):
             held[worst] = 1.0 if qd[worst] > at.qd_hi[worst] else -1.0
             null = factor(directions.inverse[held != 0.0]).null
             velocity = null @ (null.T @ directions.wanted)
-        return Resolved(qd, iteration, held)
+        return Resolved(qd, 1 + int(np.count_nonzero(held)), held)

@@ -31,11 +31,12 @@ class GeometricScaling(Baseline):
     .. math::
         \dot x_f = \alpha\,\dot x_{d\parallel} + \dot x_{d\perp},\qquad \alpha = \dot Q_{max,i}/\dot q_i
 
-    (eq. 4.19 is printed the other way round; a factor in [0, 1] is limit over demand, as in eq. 4.13). With several such
-    joints, the most critical one first, it is the point where their planes meet that is closest to the hand's velocity;
-    joints that exceed their bounds after that are added, until none does. As the thesis says, this does not always work:
-    planes can be parallel, and the point where they meet need not be the best. In the first case the whole task is
-    scaled by the common factor of eq. 4.13; the second is left as it is: the QP `cartesian-error` is what solves both.
+    (eq. 4.19 is printed the other way round; a factor in [0, 1] is limit over demand, as in eq. 4.13). With several
+    such joints, the most critical one first, it is the point where their planes meet that is closest to the hand's
+    velocity; joints that exceed their bounds after that are added, until none does. As the thesis says, this does not
+    always work: planes can be parallel, and the point where they meet need not be the best. In the first case the whole
+    task is scaled by the common factor of eq. 4.13; the second is left as it is: the QP `cartesian-error` is what
+    solves both.
     """
 
     name: ClassVar[str] = "geometric-scaling"

@@ -21,7 +21,7 @@ def check_gain(gain: float) -> None:
 
 
 def with_posture(at: Situation, gain: float) -> tuple[tuple[Array, Array], ...]:
-    """Locked rows, the hand's rows and, with a gain [1/s], the way to the middle of the joints' ranges: (J, xd) each."""
+    """Locked rows, the hand's rows and, with a gain [1/s], the way to the middle of the ranges: (J, xd) each."""
     if not gain:
         return at.tasks
     return (*at.tasks, (np.eye(at.nv)[at.limited], -gain * (at.q - at.middle)[at.limited]))

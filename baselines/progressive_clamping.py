@@ -22,13 +22,13 @@ class ProgressiveClamping(Baseline):
     r"""Joints damped one by one, in a zone before their limits (thesis eq. 3.10; Raunhardt and Boulic, 2007).
 
     .. math::
-        \dot q_i = (1 - h)\,\dot q_{0,i},\qquad h = \begin{cases} 1 & q_i + \dot q_{0,i}\,dt \text{ is beyond a limit} \\
-        3 d^2 - 2 d^3 & q_i \text{ is in the zone and moves on into it} \\ 0 & \text{else} \end{cases}
+        \dot q_i = (1 - h)\,\dot q_{0,i},\qquad h = \begin{cases} 1 & q_i + \dot q_{0,i}\,dt \text{ is beyond a limit}
+        \\ 3 d^2 - 2 d^3 & q_i \text{ is in the zone and moves on into it} \\ 0 & \text{else} \end{cases}
 
-    with d from 0 where the zone begins to 1 at the limit, and :math:`\dot q_0` of locked rows and hand by priority. (The
-    thesis prints the first case with the lower limit twice; the second one is the upper.) Joints are treated singly, so
-    that the others go on as if nothing had happened: **the locked rows are lost wherever a joint is damped.** Velocity
-    limits are no part of it.
+    with d from 0 where the zone begins to 1 at the limit, and :math:`\dot q_0` of locked rows and hand by priority.
+    (The thesis prints the first case with the lower limit twice; the second one is the upper.) Joints are treated
+    singly, so that the others go on as if nothing had happened: **the locked rows are lost wherever a joint is
+    damped.** Velocity limits are no part of it.
 
     Run-time parameters
     -------------------

@@ -122,7 +122,7 @@ class BaselineStep:
             residual = np.abs(at.J_fixed @ qd - at.v_fixed)
             share = np.abs(at.J_fixed) @ np.abs(qd) + np.abs(at.v_fixed)
             fixed_error = float(np.max(residual, initial=0.0))
-            bound_violation = float(np.max(at.over(qd), initial=0.0))
+            bound_violation = float(np.max(at.over(qd).clip(min=0.0)))
             if bound_violation > self._tolerances.bound:
                 off["joint bounds"] = f"a joint exceeds its velocity bound by {bound_violation:.1e}"
             if np.any(residual > self._tolerances.fixed * np.maximum(share, self._tolerances.fixed_floor)):

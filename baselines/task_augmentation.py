@@ -33,8 +33,8 @@ class TaskAugmentation(Baseline):
     bound the most is added first, then the system is solved again, until no other does.
 
     There is no order of priority. As long as the rows are independent all hold; where they are not (the algorithmic
-    singularities of Baillieul 1985), least squares spreads the error over all of them: **the locked rows are lost too**,
-    and the bounds are exceeded.
+    singularities of Baillieul 1985), least squares spreads the error over all of them: **the locked rows are lost
+    too**, and the bounds are exceeded.
 
     Run-time parameters
     -------------------
@@ -55,7 +55,7 @@ class TaskAugmentation(Baseline):
         J_E, x_E = np.vstack((at.J_fixed, at.J_free)), np.concatenate((at.v_fixed, at.v))
         weight = float(np.sqrt(at.inputs["limit_weight"][0]))
         held = np.zeros(at.nv)
-        for iteration in range(1, at.nv + 2):
+        for _ in range(at.nv + 1):
             rows = held != 0.0
             x_C = np.where(held > 0.0, at.qd_hi, at.qd_lo)[rows]
             J = np.vstack((J_E, weight * np.eye(at.nv)[rows]))
@@ -65,4 +65,4 @@ class TaskAugmentation(Baseline):
             if over[worst] <= 0.0:
                 break
             held[worst] = 1.0 if qd[worst] > at.qd_hi[worst] else -1.0
-        return Resolved(qd, iteration, held)
+        return Resolved(qd, 1 + int(np.count_nonzero(held)), held)

@@ -63,7 +63,9 @@ class TaskPriority(Baseline):
         """Compute the command."""
         tasks = with_posture(at, self.posture_gain)
         held = np.zeros(at.nv)
-        for iteration in range(1, at.nv + 2):
+        passes = 0
+        for _ in range(at.nv + 1):
+            passes += 1
             qd = prioritise(tasks, np.eye(at.nv)[:, held == 0.0]).qd
             if self.limits == "none":
                 break
@@ -73,4 +75,4 @@ class TaskPriority(Baseline):
             if not beyond.any():
                 break
             held = np.where(held == 0.0, beyond, held)
-        return Resolved(qd, iteration, held)
+        return Resolved(qd, passes, held)

@@ -18,6 +18,7 @@ from .store import Cell, Store, cells_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
+    from ..baselines import BaselineStep
     from ..control import InterpretedStep, Trajectory
 
 
@@ -67,7 +68,7 @@ def sweep(
     pending = list(_schedule(config, {cell: store.repeats_done(cell) for cell in cells_of(config)}))
     total = len(cells_of(config)) * config.repeats
     scenarios = {name: get_scenario(name) for name in config.scenarios}
-    steps: dict[Cell, InterpretedStep] = {}
+    steps: dict[Cell, InterpretedStep | BaselineStep] = {}
     for done, cell in enumerate(pending, start=total - len(pending)):
         if on_progress is not None:
             on_progress(done, total, str(cell))
@@ -80,7 +81,7 @@ def sweep(
     return store
 
 
-def timed_run(step: InterpretedStep, scenario: Scenario, warm_up: int) -> Trajectory:
+def timed_run(step: InterpretedStep | BaselineStep, scenario: Scenario, warm_up: int) -> Trajectory:
     """Run a scenario's closed loop once, after `warm_up` ticks that don't count.
 
     The solver forgets its set-up between the two: the first tick's `setup_time` is that of a full set-up, all others
