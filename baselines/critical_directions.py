@@ -43,6 +43,14 @@ class CriticalDirections:
         command: Array = self.resting + self.inverse @ velocity
         return command
 
+    def most_critical(self, at: Situation, qd: Array, held: Array) -> int | None:
+        """Joint, not among those `held`, that needs the smallest alpha (limit over demand); None if all fit."""
+        over = (held == 0.0) & (at.over(qd, OVER) > 0.0)
+        if not over.any():
+            return None
+        demand = np.where(over, qd - self.resting, 1.0)
+        return int(np.argmin(np.where(over, (at.nearest(qd) - self.resting) / demand, np.inf)))
+
 
 def critical_directions(at: Situation) -> CriticalDirections:
     """Work them out at a state."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from .base import Baseline, Promise, Resolved
-from .critical_directions import OVER, critical_directions
+from .critical_directions import critical_directions
 from .linear import factor
 
 if TYPE_CHECKING:
@@ -46,9 +46,8 @@ class GeometricClamping(Baseline):
         velocity = directions.wanted
         for _ in range(at.nv + 1):
             qd = directions.command(velocity)
-            over = np.where(held == 0.0, at.over(qd, OVER), 0.0)
-            worst = int(np.argmax(over))
-            if over[worst] <= 0.0:
+            worst = directions.most_critical(at, qd, held)
+            if worst is None:
                 break
             held[worst] = 1.0 if qd[worst] > at.qd_hi[worst] else -1.0
             null = factor(directions.inverse[held != 0.0]).null

@@ -53,9 +53,8 @@ class GeometricScaling(Baseline):
         held = np.zeros(at.nv)
         qd = whole
         for iteration in range(1, at.nv + 2):
-            over = np.where(held == 0.0, at.over(qd, OVER), 0.0)
-            worst = int(np.argmax(over))
-            if over[worst] <= 0.0:
+            worst = directions.most_critical(at, qd, held)
+            if worst is None:
                 return Resolved(qd, iteration, held)
             held[worst] = 1.0 if qd[worst] > at.qd_hi[worst] else -1.0
             chosen = held != 0.0

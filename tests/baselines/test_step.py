@@ -43,7 +43,7 @@ def test_promises_are_kept_and_all_else_is_reported(baseline: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("baseline", VARIANTS)
 def test_promises_are_kept_on_many_states(baseline: str) -> None:
-    check(baseline, ("lbr_med14", "lbr_med7", "ur5e", "davinci5", "kinova", "mixed_to_side"), 300)
+    check(baseline, ("lbr_med14", "lbr_med7", "ur5e", "davinci5", "kinova", "mixed_to_side"), 60)
 
 
 def check(baseline: str, robots: tuple[str, ...], count: int) -> None:
