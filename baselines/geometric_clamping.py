@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GeometricClamping(Baseline):
-    r"""The thesis's first step (4.4.1, eq. 4.14-4.18).
+    r"""What drives a joint over its bound is taken out of the hand's velocity (thesis 4.4.1, eq. 4.14-4.18).
 
     The i-th row of the inverse of the guided rows is joint i's critical direction. If the joint would exceed its bound,
     the hand's velocity loses its part along that direction,

@@ -23,7 +23,7 @@ _MEET: Final = 1e-9
 
 @dataclass(frozen=True)
 class GeometricScaling(Baseline):
-    r"""The thesis's second step (4.4.2 and 4.4.3, eq. 4.19-4.25).
+    r"""What drives a joint over its bound is scaled down, the rest kept (thesis 4.4.2, 4.4.3, eq. 4.19-4.25).
 
     A joint's bound is a plane of guided velocities, perpendicular to the joint's critical direction. If the joint would
     exceed it, the part of the hand's velocity along that direction is scaled so that it ends on the plane,

@@ -1,6 +1,9 @@
-"""The four criteria: gradients against finite differences of the criteria themselves, and what self-motion does to them."""
+"""The four criteria: gradients against finite differences of the criteria, and what self-motion does to them."""
+
+from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from kinqp.baselines import GradientProjection
@@ -24,14 +27,12 @@ def manipulability(robot: Robot, mode: Mode, q: Array) -> float:
 
 def distance(robot: Robot, q: Array, obstacle: Array) -> float:
     """From points spread densely over the skeleton, whose joints pinocchio places."""
-    import pinocchio as pin
-
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, robot.to_pinocchio(q))
     corners = [data.oMi[joint].translation.copy() for joint in range(1, robot.model.njoints)]
     corners.append(robot.pose(q)[:3, 3])
-    share = np.linspace(0.0, 1.0, 20001)[:, None]
-    points = np.vstack([a + share * (b - a) for a, b in zip(corners[:-1], corners[1:], strict=True)])
+    share = np.linspace(0.0, 1.0, 4001)[:, None]
+    points = np.vstack([a + share * (b - a) for a, b in pairwise(corners)])
     return float(np.min(np.linalg.norm(points - obstacle, axis=1)))
 
 
@@ -100,7 +101,7 @@ def test_joint_velocity_by_hand() -> None:
 class Still:
     """A hand that holds the tool where it is."""
 
-    def twist(self, t: float, pose: Array) -> Array:
+    def twist(self, t: float, pose: Array) -> Array:  # noqa: ARG002  # as a Guide is called
         return np.zeros(6)
 
 

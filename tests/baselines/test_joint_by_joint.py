@@ -55,7 +55,7 @@ class Pull:
     def __init__(self, linear: list[float]) -> None:
         self.linear = linear
 
-    def twist(self, t: float, pose: Array) -> Array:
+    def twist(self, t: float, pose: Array) -> Array:  # noqa: ARG002  # as a Guide is called
         return np.array([*self.linear, 0.0, 0.0, 0.0])
 
 

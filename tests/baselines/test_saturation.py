@@ -118,7 +118,7 @@ def test_bounds_direction_and_locked_rows_hold_and_the_optimal_scale_is_the_larg
 @given(seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=80, deadline=None)
 def test_the_optimal_variant_has_the_least_norm_at_its_scale(seed: int) -> None:
-    """By quadprog, which is given a hair more room than there is: at the largest scale the feasible set is often flat."""
+    """By quadprog, given a hair more room than there is: at the largest scale the feasible set is often flat."""
     tasks, lower, upper = random_problem(seed)
     (J_fixed, _), (J, v) = tasks
     level = saturate_tasks(tasks, lower, upper, variant="optimal")[-1]
@@ -140,7 +140,7 @@ def test_the_optimal_variant_has_the_least_norm_at_its_scale(seed: int) -> None:
 
 @pytest.mark.parametrize("text", ["position", "fix-orientation", "fix-position", "line:z"])
 def test_the_optimal_variant_is_the_formulation_task_scaling(text: str) -> None:
-    """Away from singularities, where that QP trades its two aims: the same command on the arm, joints on limits or not."""
+    """Away from singularities, where that QP trades its two aims: the same command, joints on limits or not."""
     robot, mode = arm("lbr_med14"), Mode.parse(text)
     baseline = make_step(robot, "saturation-null-space(variant=optimal)", mode)
     formulation = make_step(robot, "task-scaling", mode)
