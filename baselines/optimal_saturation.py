@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from .linear import factor, size_of
-from .saturation import Level, Problem
+from .saturation import OVER, Level, Problem
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def saturate_optimally(problem: Problem) -> Level:
     nv = len(p.start)
     if not p.wanted.any():
         # Nothing to scale; the least norm is still to be found.
-        z, held, passes = _descend(p.start, p.Z @ factor(p.J @ p.Z, size_of(p.J)).null, None, p.lower, p.upper)
+        z, held, passes = _descend(p.start, p.left, None, p.lower, p.upper)
         return Level(z, 1.0, held, passes)
     lower, upper = np.append(p.lower, 0.0), np.append(p.upper, 1.0)
     # (qd, s) with J qd - s wanted unchanged, in the null space of the tasks before.
@@ -45,11 +45,13 @@ def saturate_optimally(problem: Problem) -> Level:
     basis = np.zeros((nv + 1, free.shape[1]))
     basis[:nv], basis[nv] = p.Z @ free[:-1], free[-1]
     aim = np.append(np.zeros(nv), -1.0)
-    z, _, first = _descend(np.append(p.start, 0.0), basis, aim, lower, upper)
+    z, limiting, first = _descend(np.append(p.start, 0.0), basis, aim, lower, upper)
     scale = float(z[nv])
-    still = p.Z @ factor(p.J @ p.Z, size_of(p.J)).null
-    qd, held, second = _descend(z[:nv], still, None, p.lower, p.upper)
-    return Level(qd, scale, held, first + second)
+    qd, held, second = _descend(z[:nv], p.left, None, p.lower, p.upper)
+    # Those that limit the scale count as well, unless the least norm took them off their bounds again.
+    bound = np.where(limiting[:nv] > 0.0, p.upper, p.lower)
+    still_there = (limiting[:nv] != 0.0) & (np.abs(qd - bound) <= OVER) & (scale < 1.0)
+    return Level(qd, scale, np.where(still_there, limiting[:nv], held), first + second)
 
 
 @dataclass(frozen=True)

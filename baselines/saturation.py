@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .linear import factor, size_of
+from .linear import Factors, factor, size_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -57,6 +57,8 @@ class Problem:
         What the tasks before it lead to [rad/s or m/s].
     Z : ndarray, shape (nv, k)
         Orthonormal basis of the motions that these do not see.
+    factors : Factors
+        Of J Z.
     lower, upper : ndarray, shape (nv,)
         Bounds [rad/s or m/s].
     """
@@ -65,14 +67,21 @@ class Problem:
     wanted: Array
     start: Array
     Z: Array
+    factors: Factors
     lower: Array
     upper: Array
 
     @staticmethod
     def state(J: Array, xd: Array, start: Array, Z: Array, bounds: tuple[Array, Array]) -> Problem:
         """Make one for the task J qd = `xd`, leaving out of it what is out of reach at a singularity."""
-        wanted = factor(J @ Z, size_of(J)).reachable(xd - J @ start)
-        return Problem(J, wanted, start, Z, *bounds)
+        factors = factor(J @ Z, size_of(J))
+        return Problem(J, factors.reachable(xd - J @ start), start, Z, factors, *bounds)
+
+    @property
+    def left(self) -> Array:
+        """Orthonormal basis of the motions that neither this task nor those before it see."""
+        left: Array = self.Z @ self.factors.null
+        return left
 
 
 def saturate(problem: Problem) -> Level:
@@ -88,16 +97,15 @@ def saturate(problem: Problem) -> Level:
     """
     p = problem
     scale_of_J = size_of(p.J)
-    rank = factor(p.J @ p.Z, scale_of_J).rank
     held = np.zeros(len(p.start))
     best = Level(p.start, 0.0, held, 1)
     for iteration in range(1, len(p.start) + 2):
         chosen = held != 0.0
         bound = np.where(held > 0.0, p.upper, p.lower)
         saturating = factor(p.Z[chosen], 1.0)
-        task = factor(p.J @ p.Z @ saturating.null, scale_of_J)
-        if saturating.rank < int(chosen.sum()) or task.rank < rank:
-            return Level(best.qd, best.scale, best.held, iteration)
+        task = factor(p.J @ p.Z @ saturating.null, scale_of_J) if chosen.any() else p.factors
+        if saturating.rank < int(chosen.sum()) or task.rank < p.factors.rank:
+            break
         rest = p.start + p.Z @ saturating.solve((bound - p.start)[chosen])
         to_task = p.Z @ saturating.null
         a = to_task @ task.solve(p.wanted)
@@ -114,7 +122,11 @@ def saturate(problem: Problem) -> Level:
         critical = int(np.argmin(np.where(over > 0.0, high, np.inf)))
         held = held.copy()
         held[critical] = 1.0 if (a + b)[critical] > p.upper[critical] else -1.0
-    return Level(best.qd, best.scale, best.held, iteration)
+    if best.scale > 0.0:
+        return Level(best.qd, best.scale, best.held, iteration)
+    # Nothing moves: held back by those that were to be saturated and are at their bounds already.
+    blocked = np.minimum(p.upper - p.start, p.start - p.lower) <= OVER
+    return Level(p.start, 0.0, np.where(blocked, held, 0.0), iteration)
 
 
 def _fitting_scales(a: Array, b: Array, p: Problem, chosen: NDArray[np.bool_]) -> tuple[Array, Array]:

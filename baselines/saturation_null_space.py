@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar, Final
 import numpy as np
 
 from .base import Baseline, Promise, Resolved
-from .linear import factor, size_of
 from .optimal_saturation import saturate_optimally
 from .posture import check_gain, with_posture
 from .saturation import Level, Problem, saturate
@@ -97,7 +96,7 @@ def saturate_tasks(
     qd, Z = np.zeros(len(lower)), np.eye(len(lower))
     levels: list[Level] = []
     for J, xd in tasks:
-        levels.append(VARIANTS[variant](Problem.state(J, xd, qd, Z, (lower, upper))))
-        qd = levels[-1].qd
-        Z = Z @ factor(J @ Z, size_of(J)).null
+        problem = Problem.state(J, xd, qd, Z, (lower, upper))
+        levels.append(VARIANTS[variant](problem))
+        qd, Z = levels[-1].qd, problem.left
     return tuple(levels)

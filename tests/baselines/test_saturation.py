@@ -47,6 +47,7 @@ def test_a_joint_on_its_limit_that_the_task_needs_stops_all(variant: str) -> Non
     )
     assert level.scale == 0.0
     np.testing.assert_array_equal(level.qd, [0.0, 0.0])
+    np.testing.assert_array_equal(level.held, [1.0, 0.0])
 
 
 @pytest.mark.parametrize("variant", BOTH)
