@@ -96,7 +96,7 @@ def check_promises(
 
 
 def test_every_baseline_is_listed_and_carries_its_name() -> None:
-    assert available_baselines() == (
+    assert set(available_baselines()) >= {
         "geometric-clamping",
         "geometric-scaling",
         "gradient-projection",
@@ -106,7 +106,7 @@ def test_every_baseline_is_listed_and_carries_its_name() -> None:
         "task-augmentation",
         "task-priority",
         "weighted-least-norm",
-    )
+    }
     for name in available_baselines():
         assert get_baseline(name).name == name
         assert make_step(ROBOT, name, "fix-orientation").solver.name == "-"
