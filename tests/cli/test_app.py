@@ -49,7 +49,7 @@ def test_list_names_everything() -> None:
     assert done.returncode == 0
     for name in (
         "lbr_med14", "lbr_med7", "ur5e", "davinci5", "fix-orientation", "rcm", "cartesian-error", "joint-space",
-        "thesis-active-set", "clarabel", "piqp", "semicircle",
+        "thesis-active-set", "clarabel", "piqp", "semicircle", "task-priority", "saturation-null-space",
     ):  # fmt: skip
         assert name in done.stdout.split(), name
 
