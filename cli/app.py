@@ -28,6 +28,7 @@ from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
+from .davinci import run_davinci
 from .interrupt import interruptible
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
@@ -54,6 +55,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+app.command("davinci")(run_davinci)
 
 
 @app.command("list")

@@ -3,9 +3,9 @@ Inverse kinematics within joint limits, by steps of the same QPs that move the a
 
 One step is a QP of `joint-space` over a period of one second: the hand asks for the whole remaining error as a
 velocity, the joints may move as far as their limits and the trust region let them, and the trust region follows how
-well the linearised kinematics predicted the error. With the QP's box this is the Gauss-Newton method with box-shaped trust
-regions (Nocedal and Wright, "Numerical Optimization", 2006, section 10.3): quadratic near a solution, and where none
-exists it ends in a point that no small motion within the limits improves.
+well the linearised kinematics predicted the error. With the QP's box this is the Gauss-Newton method with box-shaped
+trust regions (Nocedal and Wright, "Numerical Optimization", 2006, section 10.3): quadratic near a solution, and where
+none exists it ends in a point that no small motion within the limits improves.
 """
 
 from __future__ import annotations
@@ -290,7 +290,8 @@ class InverseKinematics:
         low = np.where(np.isfinite(self.robot.q_min), self.robot.q_min, -np.pi)
         high = np.where(np.isfinite(self.robot.q_max), self.robot.q_max, np.pi)
         drawn: Array = qmc.Halton(self.robot.nv, rng=np.random.default_rng(seed)).random(count)
-        return low + drawn * (high - low)
+        spread: Array = low + drawn * (high - low)
+        return spread
 
 
 def _best(descents: list[_Descent]) -> _Descent:

@@ -162,6 +162,8 @@ def time_optimal_stop_and_go(
         asked.current_position, asked.target_position = begin.tolist(), end.tolist()
         asked.max_velocity, asked.max_acceleration = speed.tolist(), acceleration.tolist()
         asked.max_jerk = [np.inf] * nv
+        # A straight line between the points, where that costs no time.
+        asked.synchronization = ruckig.Synchronization.Phase
         move = ruckig.Trajectory(nv)
         outcome = planner.calculate(asked, move)
         if outcome not in (ruckig.Result.Working, ruckig.Result.Finished):
