@@ -60,7 +60,10 @@ def workspace_plane(workspace: Workspace, path: Array, plane: str) -> Chart:
     first, second, along = _PLANES[plane]
     x, y, covered = workspace.outline(along)
     lines = contourpy.contour_generator(1e3 * x, 1e3 * y, covered.T.astype(float)).lines(0.5)
-    outline = [Series("outline" if i == 0 else "", *np.array(line).T, "fill", BLUE) for i, line in enumerate(lines)]
+    outline = [
+        Series("outline" if i == 0 else "", np.array(line)[:, 0], np.array(line)[:, 1], "fill", BLUE)
+        for i, line in enumerate(lines)
+    ]
     chosen = np.random.default_rng(0).permutation(len(workspace.points))[:4_000]
     points = 1e3 * workspace.points[chosen]
     return Chart(

@@ -108,7 +108,7 @@ def save_png(chart: Chart, path: Path) -> None:
 
 
 def _draw(axes: Any, series: Series, *, solid: bool) -> None:
-    place = [series.x, series.y, *([series.z] if solid else [])]
+    place = [series.x, series.y, *([series.z] if solid and series.z is not None else [])]
     common = {"color": series.colour, "label": series.name or None}
     match series.style:
         case "line" | "dash":
@@ -157,15 +157,16 @@ def to_plotly(chart: Chart) -> Any:
 
 def _trace(go: Any, series: Series, *, solid: bool) -> Any:
     # Single precision halves the page; a seventh digit is not seen.
-    place = {"x": np.float32(series.x), "y": np.float32(series.y)}
+    place = {"x": series.x.astype(np.float32), "y": series.y.astype(np.float32)}
     if solid and series.z is not None:
-        place["z"] = np.float32(series.z)
+        place["z"] = series.z.astype(np.float32)
     common = {"name": series.name, "showlegend": bool(series.name), **place}
     if series.style == "mesh" and series.triangles is not None:
-        i, j, k = np.int32(series.triangles).T
+        i, j, k = series.triangles.astype(np.int32).T
         return go.Mesh3d(**common, i=i, j=j, k=k, color=series.colour, opacity=0.35, flatshading=True, hoverinfo="skip")
     kind = go.Scatter3d if solid else go.Scatter
-    line = {"color": series.colour, "width": 3 if solid else 1.6}
+    line: dict[str, Any] = {"color": series.colour, "width": 3 if solid else 1.6}
+    marker: dict[str, Any]
     match series.style:
         case "line" | "dash":
             return kind(**common, mode="lines", line={**line, "dash": "dash" if series.style == "dash" else "solid"})

@@ -156,7 +156,8 @@ class Workspace:
             raise ValueError(f"axis: expected 0, 1 or 2, got {axis}")
         kept = [i for i in range(3) if i != axis]
         first, second = (self.corner[i] + self.spacing * (np.arange(self.hit.shape[i]) + 0.5) for i in kept)
-        return first, second, self.filled.any(axis=axis)
+        covered: NDArray[np.bool_] = np.logical_or.reduce(self.filled, axis=axis)
+        return first, second, covered
 
     def _cubes(self, points: FloatArray) -> NDArray[np.int64]:
         cubes: NDArray[np.int64] = np.floor((points - self.corner) / self.spacing).astype(np.int64)

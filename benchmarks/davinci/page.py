@@ -154,7 +154,7 @@ def _checks(found: Davinci) -> dict[str, Any]:
         "final_degrees": point(checks.final_degrees),
         "printed_final": point(document.PRINTED_FINAL),
         "distance": f"{checks.final_distance:.2f}",
-        "rounded": f"{checks.final_rounded:.3g}",
+        "rounded": f"{checks.final_rounded:.1g}",
         "error": f"{checks.error:.3f}",
         "ranges": settled,
     }

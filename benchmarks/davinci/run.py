@@ -96,7 +96,14 @@ def _spiral_summary(study: PathStudy) -> dict[str, Any]:
     }
 
 
-def run_davinci(out: Path, *, on_stage: Callable[[str], None] | None = None) -> Davinci:
+def run_davinci(
+    out: Path,
+    *,
+    counts: tuple[int, ...] = document.COUNTS,
+    samples: int = _SAMPLES,
+    spacing: float = _SPACING,
+    on_stage: Callable[[str], None] | None = None,
+) -> Davinci:
     """Run the study and write it to a folder.
 
     Parameters
@@ -104,6 +111,10 @@ def run_davinci(out: Path, *, on_stage: Callable[[str], None] | None = None) -> 
     out : Path
         Made if need be; files of an earlier run are overwritten. It will hold `index.html`, `summary.json`,
         `A_8_12.tex`, `data/*.parquet` and `figures/*.png`.
+    counts : tuple of int
+        Points of each spiral; motions are drawn for the first.
+    samples, spacing : int, float
+        Of the workspace [-, m].
     on_stage : callable, optional
         Told what is being done.
     """
@@ -116,9 +127,9 @@ def run_davinci(out: Path, *, on_stage: Callable[[str], None] | None = None) -> 
     ik = InverseKinematics(robot, starts=4)
     example = ik(1e-3 * np.array(document.TARGET), to_si(document.START))
     tell("workspace")
-    workspace = sample_workspace(robot, _SAMPLES, spacing=_SPACING)
+    workspace = sample_workspace(robot, samples, spacing=spacing)
     studies = []
-    for count in document.COUNTS:
+    for count in counts:
         tell(f"spiral of {count} points")
         studies.append(study_path(ik, document.SPIRAL.points(count), 0.5 * (robot.q_min + robot.q_max)))
     found = Davinci(robot, entries, checks, example, workspace, tuple(studies))
