@@ -65,7 +65,7 @@ def nearest_distances(robot: Robot, targets: ArrayLike, *, starts: int = 12, see
     for number, point in enumerate(points):
         for start in drawn:
             found = least_squares(
-                remaining, start, slope, args=(point,), bounds=(0.0, 1.0), xtol=1e-14, ftol=1e-14, gtol=1e-14
+                remaining, start, slope, args=(point,), bounds=(0.0, 1.0), xtol=1e-12, ftol=1e-12, gtol=1e-12
             )
             nearest[number] = min(nearest[number], 1e-3 * float(np.linalg.norm(found.fun)))
     return nearest

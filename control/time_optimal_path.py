@@ -32,7 +32,7 @@ def time_optimal_path(points: ArrayLike, qd_max: ArrayLike, qdd_max: ArrayLike, 
     The path between the points is a monotone piecewise cubic (PCHIP): its tangent is continuous and no joint leaves
     the range of two neighbouring points, so that points within limits make a path within limits. Time along it is
     optimal on a grid of four cells a piece; what the limits are exceeded by between grid points is taken back by
-    slowing the whole down.
+    slowing the whole down. Where the points turn sharply, stopping at them can be faster.
 
     Parameters
     ----------
@@ -115,5 +115,6 @@ def _sample(grid: Array, squared: Array, dt: float) -> tuple[Array, Array, Array
     slope = (np.diff(squared) / (2.0 * np.diff(grid)))[cell]
     since = times - ends[cell]
     rate = np.maximum(speeds[cell] + slope * since, 0.0)
+    rate[[0, -1]] = 0.0  # from rest to rest, to the last bit
     s = np.clip(grid[cell] + speeds[cell] * since + 0.5 * slope * since**2, grid[cell], grid[cell + 1])
     return times, s, rate, slope

@@ -84,7 +84,15 @@ def test_time_optimal_path_keeps_limits_goes_through_the_points_and_beats_stoppi
     mean = 0.5 * (motion.qd[1:] + motion.qd[:-1])
     assert np.max(np.abs(np.diff(motion.q, axis=0) / h - mean)[:-1]) < 0.5 * 10.0 * float(h[0, 0])
     assert np.all(np.abs(np.diff(motion.qd, axis=0) / h)[:-1] <= 1.1 * QDD_MAX)
-    assert motion.t[-1] < time_optimal_stop_and_go(POINTS, QD_MAX, QDD_MAX).t[-1]
+
+
+def test_not_stopping_is_faster_along_a_smooth_path() -> None:
+    phase = np.linspace(0.0, 5.0, 40)
+    smooth = np.column_stack([0.5 * np.sin(phase), 0.1 * np.cos(phase)])
+    through = time_optimal_path(smooth, QD_MAX, QDD_MAX).t[-1]
+    assert through < 0.6 * time_optimal_stop_and_go(smooth, QD_MAX, QDD_MAX).t[-1]
+    # No faster than the joint that has the longest way at its full speed.
+    assert through > np.max(np.abs(np.diff(smooth, axis=0)).sum(axis=0) / QD_MAX)
 
 
 @pytest.mark.parametrize("plan", [time_optimal_stop_and_go, time_optimal_path])
