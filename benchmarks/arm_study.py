@@ -87,7 +87,7 @@ class PathStudy:
         return pl.DataFrame(columns).with_columns(status=pl.Series([status.value for status in given.status]))
 
 
-def study_path(ik: InverseKinematics, targets: ArrayLike, q0: ArrayLike, *, starts: int = 12) -> PathStudy:
+def study_path(ik: InverseKinematics, targets: ArrayLike, q0: ArrayLike, *, starts: int = 8) -> PathStudy:
     """Solve a row of positions, have those out of reach certified, and plan motions along the solutions.
 
     Parameters

@@ -84,7 +84,7 @@ def save_png(chart: Chart, path: Path) -> None:
     from matplotlib.figure import Figure
 
     solid = len(chart.labels) == 3
-    figure = Figure(figsize=(8.0, 6.0) if solid or chart.equal else (8.0, 4.2), dpi=120, layout="constrained")
+    figure = Figure(figsize=(8.0, 6.0) if solid or chart.equal else (8.0, 4.2), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)
     axes: Any = figure.add_subplot(projection="3d" if solid else None)
     for series in chart.series:

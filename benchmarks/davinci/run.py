@@ -124,7 +124,7 @@ def run_davinci(
     entries, checks = compare_matrix(), check_document(robot)
     tell("inverse kinematics")
     # Few starts: where a target is out of reach, the second opinion makes many more.
-    ik = InverseKinematics(robot, starts=4)
+    ik = InverseKinematics(robot, starts=2)
     example = ik(1e-3 * np.array(document.TARGET), to_si(document.START))
     tell("workspace")
     workspace = sample_workspace(robot, samples, spacing=spacing)

