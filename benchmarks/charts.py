@@ -142,7 +142,7 @@ def to_plotly(chart: Chart) -> Any:
         legend={"orientation": "h", "y": -0.18},
     )
     if solid:
-        view = {"eye": {"x": 0.7, "y": -1.5, "z": 1.3}}
+        view = {"eye": {"x": 0.85, "y": -1.8, "z": 1.5}}
         figure.update_layout(
             scene={**axes, "camera": view, "aspectmode": "manual", "aspectratio": {"x": 1.2, "y": 1.2, "z": 0.6}}
         )
