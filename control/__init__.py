@@ -1,6 +1,7 @@
 """Control: one cycle from any formulation and solver, paths, the closed loop, inverse kinematics, trajectories."""
 
-from .inverse_kinematics import IkResult, IkStatus, InverseKinematics, inverse_kinematics
+from .ik_result import IkResult, IkStatus
+from .inverse_kinematics import InverseKinematics, inverse_kinematics
 from .loop import Guide, Step, Trajectory, simulate
 from .paths import Path, PathFollower, SemicirclePath
 from .point_path import PointPath, solve_points

@@ -11,7 +11,6 @@ none exists it ends in a point that no small motion within the limits improves.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -20,6 +19,7 @@ import pinocchio as pin
 from ..formulations import Mode, ModeError
 from ..robots import finite_vector
 from ..solvers import Status
+from .ik_result import IkResult, IkStatus
 from .step import InterpretedStep, make_step
 
 if TYPE_CHECKING:
@@ -42,53 +42,6 @@ _NEARER: Final = 1e-7
 _SMALLEST_TRUST: Final = 1e-9
 # A step that keeps less than this share of its promise shrinks the trust region, one that keeps more widens it.
 _POOR, _GOOD = 0.25, 0.75
-
-
-class IkStatus(Enum):
-    """How an inverse kinematics ended."""
-
-    REACHED = "reached"
-    """Within the tolerances of the target."""
-    NEAREST = "nearest"
-    """No start came within tolerance; the best of the nearest points that they ended in."""
-    MAX_STEPS = "max steps"
-    """Neither: the best start ran out of steps."""
-
-
-@dataclass(frozen=True)
-class IkResult:
-    """What inverse kinematics found.
-
-    Attributes
-    ----------
-    q : ndarray, shape (nv,)
-        Within the limits, always [rad or m].
-    status : IkStatus
-    error : float
-        Distance of the tool centre point from its target [m].
-    angle : float
-        Angle between the tool's orientation and its target [rad]; 0 where the mode leaves orientation alone.
-    steps : int
-        Steps (QPs) of the start that found `q`.
-    total_steps : int
-        Steps of all starts.
-    starts : int
-        Number of starts made; 1 where the first one reached the target.
-    start : int
-        Which of them found `q`; 0 is the one given.
-    history : ndarray, shape (steps + 1, nv)
-        Where the start that found `q` went, its first entry within the limits already [rad or m].
-    """
-
-    q: Array
-    status: IkStatus
-    error: float
-    angle: float
-    steps: int
-    total_steps: int
-    starts: int
-    start: int
-    history: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..robots import finite_vector
-from .inverse_kinematics import IkStatus
+from .ik_result import IkStatus
 from .posture import relax
 
 if TYPE_CHECKING:
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from .inverse_kinematics import IkResult, InverseKinematics
+    from .ik_result import IkResult
+    from .inverse_kinematics import InverseKinematics
 
     Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..robots import finite_vector
 from ..solvers import QP, Status, solve
-from .inverse_kinematics import IkStatus
+from .ik_result import IkStatus
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

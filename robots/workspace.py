@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
-from scipy import ndimage
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -88,12 +87,16 @@ class Workspace:
     @cached_property
     def filled(self) -> NDArray[np.bool_]:
         """`hit`, with gaps of one cube closed: those that the samples happened to miss."""
+        from scipy import ndimage  # here, because it takes a quarter of a second to import
+
         closed = ndimage.binary_closing(self.hit, ndimage.generate_binary_structure(3, 1))
         return np.asarray(closed | self.hit, dtype=np.bool_)
 
     @property
     def on_boundary(self) -> NDArray[np.bool_]:
         """Shape (N,): which of `points` lie in a cube with a neighbour, face to face, out of reach."""
+        from scipy import ndimage
+
         inner = ndimage.binary_erosion(self.filled, ndimage.generate_binary_structure(3, 1))
         surface: NDArray[np.bool_] = ~inner[tuple(self._cubes(self.points).T)]
         return surface
