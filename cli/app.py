@@ -30,6 +30,7 @@ from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
+from .davinci import run_davinci
 from .interrupt import interruptible
 
 if TYPE_CHECKING:
@@ -60,6 +61,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+app.command("davinci")(run_davinci)
 
 
 @app.command("list")
