@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from ..control import make_step
-from ..formulations import levels_of
+from ..formulations import get_formulation, levels_of
 from ..solvers import get_solver
 from .cells import solver_of
 from .problems import Problems, choose_windows, ticks_of
@@ -80,9 +80,9 @@ class PreparedBlock:
         self.scenario: Final = get_scenario(block.scenario)
         self._config: Final = config
         self._reference: Final = get_solver(REFERENCE)
-        modes = self.scenario.modes
+        formulation = get_formulation(block.formulation)
         self._steps: Final = {
-            mode: make_step(self.scenario.robot, block.formulation, mode, self._reference) for mode in modes
+            mode: make_step(self.scenario.robot, formulation, mode, self._reference) for mode in self.scenario.modes
         }
         self._inputs: Final = {mode: self._fixed_inputs(step) for mode, step in self._steps.items()}
         windows = choose_windows(self.scenario.ticks, config.timing_ticks, config.timing_window, config.seed)

@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import pinocchio as pin
 
-from ..formulations import Mode, ModeError
+from ..formulations import JointSpace, Mode, ModeError
 from ..robots import finite_vector
 from ..solvers import Status
 from .ik_result import IkResult, IkStatus
-from .step import InterpretedStep, make_step
+from .step import make_step
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -108,8 +108,8 @@ class InverseKinematics:
         self._angle_tolerance: Final = angle_tolerance
         self._weight: Final = np.array([1.0] * 3 + [length**2] * 3)[: 6 if self._full else 3]
         self._max_steps: Final = max_steps
-        self._step: Final[InterpretedStep] = make_step(
-            robot, "joint-space", Mode.free() if self._full else Mode.position(), solver=solver
+        self._step: Final = make_step(
+            robot, JointSpace(), Mode.free() if self._full else Mode.position(), solver=solver
         )
         # A joint's whole speed is a step of about 1 rad or 0.1 m; joints without limits turn by pi at most.
         self._reach: Final = np.minimum(robot.qd_max, np.pi)
