@@ -1,20 +1,29 @@
 """Benchmarks: scenarios, sweeps over formulations and solvers, what is stored of them, and the table."""
 
+from .cells import STARTS, Block, Cell
+from .cluster import ClusterError
 from .conditions import conditions
-from .config import ConfigError, SweepConfig, load_config, make_config
-from .metrics import ON_LIMIT, CellMetrics, Spread, cell_metrics
+from .config import ConfigError, Product, SweepConfig, cells_of, load_config, make_config
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
-from .store import Cell, Store, StoreError, cells_of
-from .sweep import sweep, timed_run
+from .store import Manifest, Outcome, Part, Store, StoreError
+from .summary import ON_LIMIT, CellSummary, Spread, cell_summary
+from .sweep import sweep
 from .table import TABLE_WIDTH, sweep_table
 
 __all__ = [
     "ON_LIMIT",
+    "STARTS",
     "TABLE_WIDTH",
+    "Block",
     "Cell",
-    "CellMetrics",
+    "CellSummary",
+    "ClusterError",
     "ConfigError",
+    "Manifest",
+    "Outcome",
+    "Part",
     "Phase",
+    "Product",
     "Scenario",
     "ScenarioError",
     "Spread",
@@ -23,7 +32,7 @@ __all__ = [
     "StoreError",
     "SweepConfig",
     "available_scenarios",
-    "cell_metrics",
+    "cell_summary",
     "cells_of",
     "conditions",
     "get_scenario",
@@ -31,5 +40,4 @@ __all__ = [
     "make_config",
     "sweep",
     "sweep_table",
-    "timed_run",
 ]

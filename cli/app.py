@@ -13,6 +13,7 @@ from rich.table import Table
 
 from ..benchmarks import (
     TABLE_WIDTH,
+    ClusterError,
     ConfigError,
     Store,
     StoreError,
@@ -32,6 +33,7 @@ from .interrupt import interruptible
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
+    ClusterError,
     CompilerError,
     ConfigError,
     CurvatureError,
@@ -81,10 +83,16 @@ def list_all() -> None:
 def run_sweep(
     config: Annotated[Path | None, typer.Argument(help="TOML file; without it, the shipped default.")] = None,
     out: Annotated[Path, typer.Option(help="Results folder.")] = Path("results"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes for the accuracy part; all cores without it.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler that does the accuracy part, as tcp://host:8786.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the sweep in the results folder.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the sweep in the results folder.")] = False,
 ) -> None:
-    """Run formulations x solvers x scenarios in closed loop and print the table."""
+    """Run formulations x solvers x scenarios: accuracy in parallel, then times alone; print the table."""
     console = _console()
     store = Store(out)
     progress = Progress(
@@ -105,15 +113,23 @@ def run_sweep(
                 interrupted()
                 progress.update(bar, completed=done, total=total, description=cell)
 
-            sweep(loaded, out, resume=resume, overwrite=overwrite, on_progress=on_progress)
+            store = sweep(
+                loaded, out, resume=resume, overwrite=overwrite, workers=workers, scheduler=scheduler,
+                on_progress=on_progress,
+            )  # fmt: skip
     except KeyboardInterrupt:
-        if any((out / "cells").glob("*.parquet")):
+        if any((out / "ticks").glob("*.parquet")):
             console.print(sweep_table(store))
         again = " ".join(["kinqp sweep", *([str(config)] if config else []), "--out", str(out), "--resume"])
-        console.print(f"Interrupted; {out} keeps all runs done. Next: {again}")
+        console.print(f"Interrupted; {out} keeps all cells done. Next: {again}")
         raise typer.Exit(130) from None
     console.print(sweep_table(store))
-    console.print(f"Wrote manifest.json and one Parquet file per cell to {out}. Next: read them with polars.")
+    console.print(f"Wrote manifest.json, ticks and times of every cell to {out}. Next: read them with polars.")
+    if store.unwritten:
+        what, why = next(iter(store.unwritten.items()))
+        console.print(f"{len(store.unwritten)} results could not be written, as {what}: {why}.")
+        console.print("Next: make room, then the same command with --resume.")
+        raise typer.Exit(1)
 
 
 @app.command("export")

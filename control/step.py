@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -37,6 +38,11 @@ class InterpretedStep:
     command is the safe stop too.
 
     Not to be shared between threads.
+
+    Attributes
+    ----------
+    solved : tuple of (Instance, Solution)
+        What was solved in the last call, level by level: the evidence behind its result.
     """
 
     def __init__(self, robot: Robot, formulation: Formulation, mode: Mode, solver: Solver) -> None:
@@ -49,6 +55,14 @@ class InterpretedStep:
         # Between the levels of a hierarchy this one is handed on, not given.
         passed_on = ABOVE if len(self._levels) > 1 else None
         self._inputs: Final = tuple(dict.fromkeys(name for name in names if name != passed_on))
+        self.solved: tuple[tuple[Instance, Solution], ...] = ()
+
+    def with_solver(self, solver: Solver) -> InterpretedStep:
+        """Give the same step with another solver, without lowering its formulation again; not for another thread."""
+        made = copy(self)
+        # Not an attribute that changes: the copy is new, and this is where it is made.
+        made.__dict__.update(solver=solver, solved=())
+        return made
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -87,6 +101,7 @@ class InterpretedStep:
             if solution.status is not Status.SOLVED or not np.isfinite(_command(instance, solution)).all():
                 break
             active |= dict.fromkeys(level.active_rows(instance.qp, solution))
+        self.solved = tuple(solved)
         return self._judge(solved, tuple(active))
 
     def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> list[StepResult]:

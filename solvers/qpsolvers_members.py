@@ -35,8 +35,10 @@ class Member:
         Its verdict in the extras of qpsolvers' solution, and what that means; all else is a failure.
     not_found
         What it means that nothing was found, where there is no word and no remark.
-    iterations
-        Its count in those extras.
+    iterations, own_time
+        Its count and its own time, set-up and solve [s], in those extras.
+    initial
+        Whether qpsolvers hands it a point to start from.
     """
 
     tolerances: tuple[str, ...] = ()
@@ -51,6 +53,8 @@ class Member:
     statuses: Mapping[str, Status] = field(default_factory=dict)
     not_found: Status = Status.FAILED
     iterations: Callable[[Mapping[str, Any]], int] | None = None
+    own_time: Callable[[Mapping[str, Any]], float] | None = None
+    initial: bool = False
 
 
 def _names_of(module: str, settings: str) -> Callable[[], Iterable[str]]:
@@ -76,6 +80,7 @@ MEMBERS: Mapping[str, Member] = {
         proves=True,
         word=lambda extras: str(extras["status"]),
         statuses=CLARABEL_STATUSES,
+        own_time=lambda extras: float(extras["solve_time"]),
     ),
     "daqp": Member(tolerances=("primal_tol", "dual_tol")),
     "ecos": Member(tolerances=("feastol", "abstol", "reltol"), sparse=True, box=False),
@@ -103,6 +108,8 @@ MEMBERS: Mapping[str, Member] = {
             "run time limit reached": Status.MAX_ITERATIONS,
         },
         iterations=_info_iterations,
+        own_time=lambda extras: float(extras["info"].run_time),
+        initial=True,
     ),
     "piqp": Member(
         tolerances=(
@@ -132,6 +139,7 @@ MEMBERS: Mapping[str, Member] = {
             "PROXQP_SOLVED_CLOSEST_PRIMAL_FEASIBLE": Status.INACCURATE,
         },
         iterations=_info_iterations,
+        initial=True,
     ),
     "qpalm": Member(tolerances=("eps_abs", "eps_rel"), sparse=True),
     # Exact, hence without a tolerance. That it finds nothing is its word for contradictory constraints; all else is
@@ -157,5 +165,8 @@ MEMBERS: Mapping[str, Member] = {
             "-7": Status.MAX_ITERATIONS,
         },
         iterations=lambda extras: int(extras["iter"]),
+        # SCS counts milliseconds.
+        own_time=lambda extras: 1e-3 * float(extras["setup_time"] + extras["solve_time"]),
+        initial=True,
     ),
 }
