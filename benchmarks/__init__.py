@@ -4,6 +4,7 @@ from .cells import STARTS, Block, Cell
 from .cluster import ClusterError
 from .conditions import conditions
 from .config import ConfigError, Product, SweepConfig, cells_of, load_config, make_config
+from .metrics import REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
 from .store import Manifest, Outcome, Part, Store, StoreError
 from .summary import ON_LIMIT, CellSummary, Spread, cell_summary
@@ -12,6 +13,7 @@ from .table import TABLE_WIDTH, sweep_table
 
 __all__ = [
     "ON_LIMIT",
+    "REQUIREMENTS",
     "STARTS",
     "TABLE_WIDTH",
     "Block",
@@ -32,12 +34,17 @@ __all__ = [
     "StoreError",
     "SweepConfig",
     "available_scenarios",
+    "cell_record",
     "cell_summary",
     "cells_of",
     "conditions",
+    "geometric_means",
     "get_scenario",
     "load_config",
     "make_config",
+    "performance_profile",
+    "records",
+    "scorecard",
     "sweep",
     "sweep_table",
 ]

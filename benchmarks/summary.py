@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
+
+from .metrics.motion import ON_LIMIT
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -14,9 +16,6 @@ if TYPE_CHECKING:
     from .scenarios import Scenario
 
     Array = NDArray[np.float64]
-
-# How close to its limit a joint counts as being on it [rad or m].
-ON_LIMIT: Final = 1e-6
 
 
 @dataclass(frozen=True)
