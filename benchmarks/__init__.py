@@ -2,8 +2,10 @@
 
 from .cells import STARTS, Block, Cell
 from .cluster import ClusterError
+from .compare import Comparison, compare
 from .conditions import conditions
 from .config import ConfigError, Product, SweepConfig, cells_of, load_config, make_config
+from .errors import CompareError, ReportError
 from .metrics import REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
 from .store import Manifest, Outcome, Part, Store, StoreError
@@ -20,12 +22,15 @@ __all__ = [
     "Cell",
     "CellSummary",
     "ClusterError",
+    "CompareError",
+    "Comparison",
     "ConfigError",
     "Manifest",
     "Outcome",
     "Part",
     "Phase",
     "Product",
+    "ReportError",
     "Scenario",
     "ScenarioError",
     "Spread",
@@ -37,6 +42,7 @@ __all__ = [
     "cell_record",
     "cell_summary",
     "cells_of",
+    "compare",
     "conditions",
     "geometric_means",
     "get_scenario",

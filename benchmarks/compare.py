@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from .compare_cell import THRESHOLDS, Finding, compare_ticks, correctness
+from .errors import CompareError
 from .scenarios import get_scenario
 from .time_ratio import MIN_REPEATS, time_ratios
 
@@ -25,10 +26,6 @@ if TYPE_CHECKING:
 MACHINE: Final = ("cpu", "cores", "system")
 #: A time counts as changed where its whole interval lies beyond this share.
 TOLERANCE: Final = 0.10
-
-
-class CompareError(ValueError):
-    """Two sweeps can't be compared as asked; the message says what to do."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +161,9 @@ def _only(these: Sequence[Cell], those: Iterable[Cell]) -> tuple[str, ...]:
 
 def _conditions(a: dict[str, str], b: dict[str, str]) -> tuple[list[str], bool]:
     differing = [key for key in dict.fromkeys([*a, *b]) if a.get(key) != b.get(key) and key != "date"]
-    warnings = [f"{key} differs: {a.get(key, 'not recorded')} in A, {b.get(key, 'not recorded')} in B" for key in differing]
+    warnings = [
+        f"{key} differs: {a.get(key, 'not recorded')} in A, {b.get(key, 'not recorded')} in B" for key in differing
+    ]
     return warnings, not any(key in differing for key in MACHINE)
 
 
@@ -173,7 +172,9 @@ def _about_times(ratios: list[float], cells: int) -> list[str]:
         return [f"times were not compared: no cell has {MIN_REPEATS} repeats or more on both sides"]
     warnings = []
     if len(ratios) < cells:
-        warnings.append(f"times were compared in {len(ratios)} of {cells} cells: the rest have no times, or too few repeats")
+        warnings.append(
+            f"times were compared in {len(ratios)} of {cells} cells: the rest have no times, or too few repeats"
+        )
     drift = float(np.exp(np.median(np.log(ratios))))
     if not 0.95 < drift < 1.05:
         warnings.append(

@@ -14,7 +14,9 @@ from rich.table import Table
 from ..benchmarks import (
     TABLE_WIDTH,
     ClusterError,
+    CompareError,
     ConfigError,
+    ReportError,
     Store,
     StoreError,
     available_scenarios,
@@ -30,10 +32,12 @@ from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
 from .interrupt import interruptible
+from .report import run_compare, run_report
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
     ClusterError,
+    CompareError,
     CompilerError,
     ConfigError,
     CurvatureError,
@@ -43,6 +47,7 @@ USER_ERRORS = (
     OptionError,
     PlotError,
     PluginError,
+    ReportError,
     RobotError,
     StoreError,
     UnknownOptionError,
@@ -56,6 +61,10 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+app.command("report")(run_report)
+app.command("compare")(run_compare)
 
 
 @app.command("list")

@@ -15,6 +15,4 @@ DASHES: Final = ("solid", "dash", "dot")
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Colour and dash of each name, by its place in the list."""
-    return {
-        name: (COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]) for i, name in enumerate(names)
-    }
+    return {name: (COLOURS[i % len(COLOURS)], DASHES[i // len(COLOURS) % len(DASHES)]) for i, name in enumerate(names)}

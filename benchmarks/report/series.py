@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..metrics import Ticks
+
 if TYPE_CHECKING:
     import polars as pl
     from numpy.typing import NDArray
@@ -74,27 +76,10 @@ def samples(times: pl.DataFrame, clock: str) -> Samples:
     return Samples(tick[order], seconds[order])
 
 
-def acceleration_share(ticks: pl.DataFrame, scenario: Scenario) -> Array:
-    """Largest joint acceleration of each tick as a share of its limit, by differences of commands, from rest.
-
-    Parameters
-    ----------
-    ticks : pl.DataFrame
-        A cell's `ticks` frame.
-    scenario : Scenario
-        Must be a closed loop: between unrelated states there is no acceleration.
-
-    Returns
-    -------
-    ndarray, shape (N,)
-        NaN where the tick before was not run.
-    """
-    if scenario.states is not None:
-        raise ValueError(f"scenario {scenario.name!r}: expected a closed loop, got states one by one")
-    qdd = np.diff(vectors(ticks, "qd"), axis=0, prepend=0.0) / scenario.dt
-    largest: Array = np.max(np.abs(qdd) / scenario.robot.qdd_max, axis=1)
-    largest[np.diff(positions(ticks, scenario), prepend=-1) != 1] = np.nan
-    return largest
+def acceleration_share(ticks: pl.DataFrame, scenario: Scenario) -> Array | None:
+    """Largest joint acceleration of each tick as a share of its limit, shape (N,); None where it is no closed loop."""
+    cell = Ticks(scenario, ticks)
+    return np.max(np.abs(cell.acceleration), axis=1) if cell.closed_loop else None
 
 
 def positions(ticks: pl.DataFrame, scenario: Scenario) -> Index:

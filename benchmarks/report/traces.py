@@ -48,8 +48,9 @@ def curves(ticks: pl.DataFrame | None, times: pl.DataFrame | None, scenario: Sce
         drawn["iterations"] = _curve(tick, ticks["iterations"].to_numpy(), buckets)
         drawn["sigma"] = _curve(tick, ticks["sigma_min"].to_numpy(), buckets)
         drawn["scale"] = _curve(tick, ticks["task_scale"].to_numpy(), buckets)
-        if scenario.states is None:
-            drawn["acceleration"] = _curve(tick, acceleration_share(ticks, scenario), buckets)
+        acceleration = acceleration_share(ticks, scenario)
+        if acceleration is not None:
+            drawn["acceleration"] = _curve(tick, acceleration, buckets)
             drawn["phase"] = {str(joint): _phase(ticks, scenario, joint, buckets) for joint in scenario.watched_joints}
     if times is not None and len(times):
         for clock in CLOCKS:

@@ -41,6 +41,10 @@ function fillChips() {
     return chip;
   }));
 }
+const measureName = (one) => {
+  const group = one.group === "main" ? "" : one.group.replace("time: ", "") + ": ";
+  return group + one.label + (one.unit ? ` [${one.unit}]` : "");
+};
 function showFirst(names, wanted) {
   const ordered = [...names.filter((name) => name === wanted), ...names.filter((name) => name !== wanted)];
   return new Set(ordered.slice(0, 4));
@@ -73,13 +77,19 @@ function start() {
   state.shown.formulations = showFirst(REPORT.formulations, state.formulation);
   fillControls();
   for (const name of STORED) byId(name).addEventListener("change", (event) => select({ [name]: event.target.value }));
-  options(byId("map-measure"), REPORT.columns.map((one) => [one.key, one.label + (one.unit ? ` [${one.unit}]` : "")]), REPORT.first_measure);
+  options(byId("map-measure"), ONCE.map((one) => [one.key, measureName(one)]), REPORT.first_measure);
   options(byId("map-solver"), REPORT.solvers, state.solver);
   options(byId("map-start"), REPORT.starts, state.start);
   for (const id of ["map-measure", "map-solver", "map-start"]) byId(id).addEventListener("change", drawOverview);
   options(byId("profile-clock"), REPORT.clocks.map((one) => [one.name, one.text]), state.clock);
-  byId("profile-clock").addEventListener("change", drawProfile);
+  for (const id of ["profile-clock", "profile-of"]) byId(id).addEventListener("change", drawProfile);
   const every = (values) => [["", "all"], ...values.map((value) => [value, value])];
+  if (byId("score-table")) {
+    options(byId("score-solver"), every(REPORT.solvers), REPORT.solvers[0]);
+    options(byId("score-start"), every(REPORT.starts), REPORT.starts[0]);
+    for (const id of ["score-solver", "score-start"]) byId(id).addEventListener("change", filterScore);
+    filterScore();
+  }
   options(byId("only-scenario"), every(REPORT.scenarios.map((one) => one.name)), "");
   options(byId("only-formulation"), every(REPORT.formulations), "");
   options(byId("only-solver"), every(REPORT.solvers), "");

@@ -1,12 +1,14 @@
 // The table of all cells: sorts by any column, filters by words and by comparisons such as p99<50.
 const table = { sort: null, down: false, limit: 100, rows: [] };
 const FIXED = [["scenario", "scenario"], ["formulation", "formulation"], ["solver", "solver"], ["start", "start"], ["state", "state"]];
+// Some measures stand in two groups.
+const ONCE = REPORT.columns.filter((column, place, all) => all.findIndex((one) => one.key === column.key) === place);
 const COMPARE = /^([\w.]+)(<=|>=|<|>|=)(-?[\d.]+(?:e[+-]?\d+)?)$/i;
 
 function valueOf(cell, key) {
   if (key in cell && key !== "values") return cell[key];
-  const place = REPORT.columns.findIndex((column) => column.key === key);
-  return place < 0 || !cell.values ? null : cell.values[place];
+  const column = REPORT.columns.find((one) => one.key === key);
+  return !column || !cell.values ? null : cell.values[column.at];
 }
 // What is typed is in the unit that is shown.
 function shownValue(cell, key) {
@@ -44,7 +46,8 @@ function refreshTable() {
   fillTable();
 }
 function fillTable() {
-  const columns = REPORT.columns.filter((column) => byId("group").value === "all" || column.group === byId("group").value);
+  const group = byId("group").value;
+  const columns = group === "all" ? ONCE : REPORT.columns.filter((column) => column.group === group);
   const head = element("tr");
   for (const [key, label] of FIXED) head.append(headCell(key, label, "", "What it is."));
   for (const column of columns) head.append(headCell(column.key, column.label, column.unit, column.help, "num"));
@@ -82,7 +85,7 @@ function headCell(key, label, unit, help, kind = "") {
 }
 function saveCsv() {
   const quote = (value) => (/[",\n]/.test(value) ? `"${value.replace(/"/g, '""')}"` : value);
-  const keys = [...FIXED.map(([key]) => key), ...REPORT.columns.map((column) => column.key)];
+  const keys = [...FIXED.map(([key]) => key), ...ONCE.map((column) => column.key)];
   const lines = table.rows.map((cell) => keys.map((key) => quote(String(valueOf(cell, key) ?? ""))).join(","));
   const link = element("a", null, { download: "cells.csv" });
   link.href = URL.createObjectURL(new Blob([[keys.join(","), ...lines].join("\n") + "\n"], { type: "text/csv" }));

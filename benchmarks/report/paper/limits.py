@@ -14,11 +14,15 @@ from .style import BUCKETS, DASHES, figure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    import polars as pl
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from ...scenarios import Scenario
     from .style import Series
+
+    Array = NDArray[np.float64]
 
 _LINES: Final = {"viable": ("-", "admissible"), "thesis": (":", "admissible (thesis, eq. 4.11)")}
 _MOST_JOINTS: Final = 3
@@ -26,21 +30,21 @@ _MOST_JOINTS: Final = 3
 
 def singular_figure(series: Sequence[Series], scenario: Scenario) -> Figure | None:
     """Smallest singular value, joint accelerations and the share of the pull followed; None for states one by one."""
-    runs = [(one, one.ticks) for one in series if one.ticks is not None and len(one.ticks)]
-    if scenario.states is not None or not runs:
+    runs = _closed_loops(series, scenario)
+    if not runs:
         return None
     made, axes = figure(3, 1, 1.3, sharex=True)
-    for one, ticks in runs:
-        curves = (
-            ticks["sigma_min"].to_numpy(),
-            acceleration_share(ticks, scenario),
-            ticks["task_scale"].to_numpy(),
-        )
+    for one, ticks, acceleration in runs:
+        curves = (ticks["sigma_min"].to_numpy(), acceleration, ticks["task_scale"].to_numpy())
         for (axis,), values in zip(axes, curves, strict=True):
             at = extremes(values, BUCKETS)
             t = positions(ticks, scenario)[at] * scenario.dt
             axis.plot(t, values[at], color=one.colour, linestyle=DASHES[one.dash], label=one.case.cell.formulation)
-    for (axis,), label in zip(axes, ("smallest singular\nvalue", "largest joint accel.\nover its limit", "share of the\npull followed"), strict=True):
+    for (axis,), label in zip(
+        axes,
+        ("smallest singular\nvalue", "largest joint accel.\nover its limit", "share of the\npull followed"),
+        strict=True,
+    ):
         axis.set_ylabel(label)
         axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
     axes[1][0].axhline(1.0, color="0.3", linewidth=0.7, linestyle="--")
@@ -51,15 +55,15 @@ def singular_figure(series: Sequence[Series], scenario: Scenario) -> Figure | No
 
 def phase_figure(series: Sequence[Series], scenario: Scenario) -> Figure | None:
     """Velocity over position of the watched joints, with the admissible area; None where there is nothing to watch."""
-    runs = [(one, one.ticks) for one in series if one.ticks is not None and len(one.ticks)]
+    runs = _closed_loops(series, scenario)
     joints = scenario.watched_joints[:_MOST_JOINTS]
-    if scenario.states is not None or not runs or not joints:
+    if not runs or not joints:
         return None
     made, axes = figure(1, len(joints), 2.6)
     for axis, joint in zip(axes[0], joints, strict=True):
         unit, scale = unit_of(scenario, joint)
         _area(axis, scenario, joint)
-        for one, ticks in runs:
+        for one, ticks, _ in runs:
             q, qd = (scale * vectors(ticks, name)[:, joint] for name in ("q", "qd"))
             at = np.union1d(extremes(q, BUCKETS), extremes(qd, BUCKETS))
             axis.plot(q[at], qd[at], color=one.colour, linestyle=DASHES[one.dash], label=one.case.cell.formulation)
@@ -67,6 +71,17 @@ def phase_figure(series: Sequence[Series], scenario: Scenario) -> Figure | None:
         axis.set_ylabel(f"velocity [{unit}/s]")
     _legend(made, axes[0][0])
     return made
+
+
+def _closed_loops(series: Sequence[Series], scenario: Scenario) -> list[tuple[Series, pl.DataFrame, Array]]:
+    """Runs in which one tick leads to the next, with their accelerations."""
+    runs = []
+    for one in series:
+        if one.ticks is not None and len(one.ticks):
+            acceleration = acceleration_share(one.ticks, scenario)
+            if acceleration is not None:
+                runs.append((one, one.ticks, acceleration))
+    return runs
 
 
 def _area(axis: Axes, scenario: Scenario, joint: int) -> None:

@@ -56,7 +56,9 @@ def style() -> Iterator[None]:
         yield
 
 
-def figure(rows: int, columns: int, row_height: float, *, extra: float = 0.6, **options: object) -> tuple[Figure, list[list[Axes]]]:
+def figure(
+    rows: int, columns: int, row_height: float, *, extra: float = 0.6, **options: object
+) -> tuple[Figure, list[list[Axes]]]:
     """Make a figure of the paper's width with a grid of axes; `options` go to `Figure.subplots`."""
     made = Figure(figsize=(WIDTH, rows * row_height + extra), layout="constrained")
     axes = made.subplots(rows, columns, squeeze=False, **options)
