@@ -6,10 +6,10 @@ from .compare import Comparison, compare
 from .conditions import conditions
 from .config import ConfigError, Product, SweepConfig, cells_of, load_config, make_config
 from .errors import CompareError, ReportError
-from .metrics import REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
+from .metrics import ON_LIMIT, REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
 from .store import Manifest, Outcome, Part, Store, StoreError
-from .summary import ON_LIMIT, CellSummary, Spread, cell_summary
+from .summary import CellSummary, Spread, cell_summary
 from .sweep import sweep
 from .table import TABLE_WIDTH, sweep_table
 

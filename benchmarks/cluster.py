@@ -53,7 +53,7 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
         client: Any = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(f"--scheduler: expected a Dask scheduler at {scheduler}, got: {error}") from error
-    with client:
+    with client, client.as_current():
         try:
             client.wait_for_workers(1, timeout=_PATIENCE)
         except TimeoutError as error:

@@ -305,11 +305,13 @@ def _line(text: str, loc: tuple[int | str, ...], message: str) -> str:
             break
     if start is None:
         return ""
+    found = start
     for number in range(start, len(lines)):
         if number > start and re.match(r"\s*(\[\[|[\w\"'-]+\s*=)", lines[number]):
             break
         for one, other in re.findall(r'"([^"]*)"|\'([^\']*)\'', lines[number].partition("#")[0]):
             name = one or other
-            if name and name in message:
-                return f", line {number + 1}"
-    return f", line {start + 1}"
+            # Named as what was got; choices stand in messages without quotes.
+            if f"{name.partition('(')[0]!r}" in message or f"twice: {name}" in message:
+                found = number
+    return f", line {found + 1}"

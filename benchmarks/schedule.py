@@ -73,7 +73,7 @@ def on_this_machine(tasks: Sequence[Task], config: SweepConfig, workers: int) ->
         for thread in threads:
             thread.join(timeout=10.0)
         for worker in processes:
-            worker.close()
+            worker.stop()
 
 
 class _Pending:

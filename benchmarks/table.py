@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .store import Store
 
 # Width that all columns need; a narrower terminal would fold figures.
-TABLE_WIDTH = 170
+TABLE_WIDTH = 190
 
 
 def sweep_table(store: Store) -> RenderableType:

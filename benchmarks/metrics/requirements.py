@@ -230,7 +230,7 @@ REQUIREMENTS: Final = (
         10, "unexpected", "No unexpected motion of the robot",
         "ticks at which a joint's velocity changes by more than twice what its acceleration limit allows, plus sign "
         "changes of accelerations above 1 % of it, per second, switches of mode aside",
-        "1/s", 0.5, unexpected_motion,
+        "1/s", 1.0, unexpected_motion,
     ),
 )  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 import polars as pl
+import polars.selectors as cs
 
 from ..scenarios import get_scenario
 from .ratios import RecordsError
@@ -35,7 +36,8 @@ def records(store: Store) -> pl.DataFrame:
         ).flat() | {"scenario": cell.scenario}
         for cell in store.cells()
     ]  # fmt: skip
-    return pl.DataFrame(rows, infer_schema_length=None)
+    # What no cell has is a column of numbers all the same.
+    return pl.DataFrame(rows, infer_schema_length=None).with_columns(cs.by_dtype(pl.Null).cast(pl.Float64))
 
 
 def scorecard(store: Store) -> pl.DataFrame:
@@ -74,6 +76,7 @@ def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
         if name not in cells.columns:
             raise RecordsError(f"records: expected a column {name!r}, got {', '.join(cells.columns)}")
     own = f"requirement_{_RELATIVE}"
+    cells = cells.with_columns(cs.starts_with("requirement_").cast(pl.Float64))
     cells = cells.with_columns(pl.col(own) / pl.col(own).max().over("scenario"))
     rows = []
     for key, group in cells.group_by(_CONTROLLER, maintain_order=True):

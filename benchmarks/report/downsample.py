@@ -25,8 +25,8 @@ def extremes(values: ArrayLike, buckets: int, *, group: ArrayLike | None = None)
     buckets : int
         Number of buckets, at least one. With at most two values to a bucket all are kept.
     group : array_like of int, shape (N,), optional
-        Ascending positions, where several values share one (repeats of a tick): buckets are of equal length in them.
-        The values' own indices without it.
+        Ascending positions, where several values share one (repeats of a tick): buckets hold equally many of
+        them. The values' own indices without it.
 
     Returns
     -------
@@ -48,8 +48,8 @@ def extremes(values: ArrayLike, buckets: int, *, group: ArrayLike | None = None)
         raise ValueError(f"group: expected ascending positions of shape {x.shape}, got shape {at.shape}")
     if x.size <= 2 * buckets:
         return np.arange(x.size)
-    span = int(at[-1] - at[0]) + 1
-    bucket = (at - at[0]) * buckets // span
+    _, at = np.unique(at, return_inverse=True)
+    bucket = at * buckets // (int(at[-1]) + 1)
     starts = np.flatnonzero(np.diff(bucket, prepend=-1))
     low = np.where(np.isnan(x), np.inf, x)
     high = np.where(np.isnan(x), -np.inf, x)

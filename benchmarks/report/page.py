@@ -185,7 +185,7 @@ def _render(
     names = [len(data[key]) for key in ("formulations", "solvers", "scenarios")]
     count = {
         state: sum(cell["state"] == state for cell in cells)
-        for state in ("failed", "dishonest", "wrong at times", "not run", "ok")
+        for state in ("failed", "dishonest", "unsolved", "not run", "ok")
     }
     rows = scorecard_rows(records)
     conditions = manifest.conditions
@@ -233,7 +233,7 @@ def _tiles(total: int, count: dict[str, int], rows: Sequence[object]) -> list[di
             "By residuals that we compute, or a certificate where one is expected.",
             "good",
         ),
-        tile(count["wrong at times"], "wrong at times, and said so", "Some ticks ended without an answer."),
+        tile(count["unsolved"], "unsolved at times, and said so", "Some ticks, or all, ended without the right answer."),
         tile(
             count["dishonest"],
             "dishonest",

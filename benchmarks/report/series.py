@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CLOCKS: Final = {
     "wall": "update + solve through Python",
     "own": "the solver's own timer",
-    "c": "C, no Python in the measured span",
+    "c": "in C, without Python",
 }
 
 # Where figure 4.8 of the thesis cuts.

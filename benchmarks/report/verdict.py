@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .source import Case
 
 #: In the order of what is worse.
-STATES = ("failed", "dishonest", "wrong at times", "not run", "ok")
+STATES = ("failed", "dishonest", "unsolved", "not run", "ok")
 
 
 def verdict(case: Case, record: dict[str, Any] | None, ticks: pl.DataFrame | None) -> tuple[str, str]:
@@ -37,7 +37,7 @@ def verdict(case: Case, record: dict[str, Any] | None, ticks: pl.DataFrame | Non
     if record["success"] < 1.0:
         wrong = ticks.filter(ticks["status"] != case.scenario.expects.value)["status"].to_list()
         counted = ", ".join(f"{status} {count} times" for status, count in Counter(wrong).most_common())
-        return "wrong at times", f"right at {_percent(record['success'])} of ticks: {counted}" + _first(case, ticks)
+        return "unsolved", f"right at {_percent(record['success'])} of ticks: {counted}" + _first(case, ticks)
     return "ok", ""
 
 

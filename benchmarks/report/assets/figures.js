@@ -10,7 +10,8 @@ const axis = (title, more = {}) => ({
 const layout = (height, more = {}) => ({
   height, margin: { l: 64, r: 18, t: 14, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
   font: { family: getComputedStyle(document.body).fontFamily, size: 12.5, color: colour("--ink") },
-  hoverlabel: { font: { size: 12.5 } }, showlegend: false, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
+  hoverlabel: { font: { size: 12.5 } },
+  modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("--line"), activecolor: colour("--muted") }, showlegend: false, legend: { orientation: "h", y: 1.02, yanchor: "bottom", x: 0 },
   ...more,
 });
 const suffix = (index) => (index ? String(index + 1) : "");
@@ -30,8 +31,8 @@ function draw(id, traces, made) {
 
 // One panel per series on one scale: zigzags drawn over each other can't be told apart.
 function panels(id, series, options) {
-  const count = series.length, gap = 0.16 / Math.max(count, 1), size = (1 - gap * (count - 1)) / Math.max(count, 1);
-  const made = layout(70 + 108 * count, { xaxis: axis(options.x, { anchor: "y" + suffix(count - 1) }), annotations: [] });
+  const count = Math.max(series.length, 1), height = 112 * count - 26, gap = 26 / height, size = 86 / height;
+  const made = layout(height + 26 + 44, { xaxis: axis(options.x, { anchor: "y" + suffix(count - 1) }), annotations: [] });
   const traces = series.map((one, index) => {
     const top = 1 - index * (size + gap);
     made["yaxis" + suffix(index)] = axis(index === Math.floor((count - 1) / 2) ? options.y : "", {
@@ -44,8 +45,8 @@ function panels(id, series, options) {
     });
     return {
       x: one.x, y: one.y, name: one.name, xaxis: "x", yaxis: "y" + suffix(index), mode: options.points ? "markers" : "lines",
-      line: { color: one.colour, width: 1.1 }, marker: { color: one.colour, size: 3.5 },
-      hovertemplate: `%{y:.4~g} ${options.unit}<br>${options.points ? "state %{x}" : "%{x:.3f} s"}<extra>${escapeText(one.name)}</extra>`,
+      line: { color: one.colour, width: 1.2 }, marker: { color: one.colour, size: 4, opacity: 0.8 },
+      hovertemplate: `%{y:.4~g} ${options.unit}<br>${options.still ? "state %{x}" : "%{x:.3f} s"}<extra>${escapeText(one.name)}</extra>`,
     };
   });
   made.shapes = options.marks || [];
@@ -75,6 +76,9 @@ function startFor(formulation, solver) {
   return REPORT.starts.find((start) => cellOf(state.scenario, formulation, solver, start)) || state.start;
 }
 
+// Runs that coincide are seen nonetheless: the first lies widest, the last narrowest on top.
+const nested = (place, count) => 1.4 + 1.5 * (count - 1 - place);
+
 let drawing = 0;
 async function drawScenario() {
   const turn = ++drawing;
@@ -93,8 +97,8 @@ async function drawScenario() {
   });
   const clock = REPORT.clocks.find((one) => one.name === state.clock);
   const noClock = `None of the cells shown has this clock (${clock.text}). Choose another one above.`;
-  panels("plot-iterations", series((c) => c.iterations), { x: xTitle, y: "iterations", unit: "iterations", marks, points: still });
-  const timed = { x: xTitle, y: "time [\u00b5s]", unit: "\u00b5s", marks, points: still, empty: noClock };
+  panels("plot-iterations", series((c) => c.iterations), { x: xTitle, y: "iterations", unit: "iterations", marks, still, points: still });
+  const timed = { x: xTitle, y: "time [\u00b5s]", unit: "\u00b5s", marks, still, points: true, empty: noClock };
   panels("plot-times", series((c) => c[state.clock] && c[state.clock].all), { ...timed, log: true });
   panels("plot-cut", series((c) => c[state.clock] && c[state.clock].cut), timed);
   drawDistributions(all, clock, noClock);
@@ -136,14 +140,15 @@ function drawSingular(series, xTitle, marks, still) {
     made["yaxis" + suffix(index)] = axis(title, {
       domain: [1 - (index + 1) * size + (index < rows.length - 1 ? 0.035 : 0), 1 - index * size], rangemode: "tozero", nticks: 5,
     });
-    for (const one of series((c) => c[key])) {
+    const lines = series((c) => c[key]);
+    lines.forEach((one, place) => {
       traces.push({
         x: one.x, y: one.y, name: one.name, legendgroup: one.name, showlegend: index === 0, yaxis: "y" + suffix(index),
         mode: still ? "markers" : "lines", marker: { color: one.colour, size: 3.5 },
-        line: { color: one.colour, width: 1.3, dash: one.dash },
+        line: { color: one.colour, width: nested(place, lines.length), dash: one.dash },
         hovertemplate: `%{y:.4~g}<extra>${escapeText(one.name)}</extra>`,
       });
-    }
+    });
   });
   made.shapes = [...marks];
   const at = rows.findIndex(([key]) => key === "acceleration");
@@ -178,16 +183,22 @@ function drawPhase(all, scenario) {
         showlegend: index === 0,
       });
     }
-    for (const one of all) {
-      const phase = one.curves.phase && one.curves.phase[joint.index];
-      if (!phase) continue;
+    const runs = all.filter((one) => one.curves.phase && one.curves.phase[joint.index]);
+    const near = (values, floor) => {
+      const low = Math.min(...values), high = Math.max(...values), room = Math.max(0.5 * (high - low), floor);
+      return [low - room, high + room];
+    };
+    made["xaxis" + suffix(index)].range = near(runs.flatMap((one) => one.curves.phase[joint.index].q), 2);
+    made["yaxis" + suffix(index)].range = near(runs.flatMap((one) => one.curves.phase[joint.index].qd), 2);
+    runs.forEach((one, place) => {
+      const phase = one.curves.phase[joint.index];
       traces.push({
         x: phase.q, y: phase.qd, name: one.name, legendgroup: one.name, showlegend: index === 0, mode: "lines", ...axes,
-        line: { color: one.colour, width: 1.8, dash: one.dash }, customdata: phase.lo.map((low, k) => [low, phase.hi[k]]),
+        line: { color: one.colour, width: nested(place, runs.length), dash: one.dash }, customdata: phase.lo.map((low, k) => [low, phase.hi[k]]),
         hovertemplate: `%{x:.4~g} ${unit}, %{y:.4~g} ${unit}/s<br>allowed then: %{customdata[0]:.4~g} to %{customdata[1]:.4~g}` +
           `<extra>${escapeText(one.name)}</extra>`,
       });
-    }
+    });
   });
   draw("plot-phase", traces, {
     ...made, empty: "This scenario watches no joint, or its states have nothing to do with each other.",

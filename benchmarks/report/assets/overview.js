@@ -15,7 +15,7 @@ function drawOverview() {
   const heat = colour("--heat");
   draw("plot-map", rows.length ? [{
     type: "heatmap", x: scenarios, y: rows, z, text: raw.map((line) => line.map((v) => (v === null ? "" : number(v, column.format)))),
-    texttemplate: "%{text}", hovertemplate: "%{y}<br>%{x}<br><b>%{text}</b> " + column.unit + "<extra></extra>", xgap: 2, ygap: 2,
+    texttemplate: "%{text}", textfont: { color: colour("--ink") }, hovertemplate: "%{y}<br>%{x}<br><b>%{text}</b> " + column.unit + "<extra></extra>", xgap: 2, ygap: 2,
     colorscale: [[0, `rgba(${heat}, .05)`], [1, `rgba(${heat}, .62)`]], showscale: false, hoverongaps: false,
   }] : [], layout(120 + 34 * rows.length, {
     xaxis: axis("", { side: "top", tickangle: -30, showgrid: false }), yaxis: axis("", { autorange: "reversed", showgrid: false }),

@@ -39,7 +39,7 @@ def distributions_figure(series: Sequence[Series]) -> Figure | None:
     for row, formulation in enumerate(formulations):
         axes[row][0].set_ylabel(f"{formulation}\nshare of solves")
     for column, clock in enumerate(clocks):
-        axes[0][column].set_title(CLOCKS[clock], loc="left")
+        axes[0][column].set_title(CLOCKS[clock], loc="left", fontsize=7)
         axes[-1][column].set_xlabel("time [µs]")
     for axis in (axis for row in axes for axis in row):
         axis.set_xscale("log")

@@ -34,12 +34,19 @@ def singular_figure(series: Sequence[Series], scenario: Scenario) -> Figure | No
     if not runs:
         return None
     made, axes = figure(3, 1, 1.3, sharex=True)
-    for one, ticks, acceleration in runs:
+    for place, (one, ticks, acceleration) in enumerate(runs):
         curves = (ticks["sigma_min"].to_numpy(), acceleration, ticks["task_scale"].to_numpy())
         for (axis,), values in zip(axes, curves, strict=True):
             at = extremes(values, BUCKETS)
             t = positions(ticks, scenario)[at] * scenario.dt
-            axis.plot(t, values[at], color=one.colour, linestyle=DASHES[one.dash], label=one.case.cell.formulation)
+            axis.plot(
+                t,
+                values[at],
+                color=one.colour,
+                linestyle=DASHES[one.dash],
+                label=one.case.cell.formulation,
+                linewidth=_nested(place, len(runs)),
+            )
     for (axis,), label in zip(
         axes,
         ("smallest singular\nvalue", "largest joint accel.\nover its limit", "share of the\npull followed"),
@@ -63,10 +70,20 @@ def phase_figure(series: Sequence[Series], scenario: Scenario) -> Figure | None:
     for axis, joint in zip(axes[0], joints, strict=True):
         unit, scale = unit_of(scenario, joint)
         _area(axis, scenario, joint)
-        for one, ticks, _ in runs:
+        seen: list[Array] = []
+        for place, (one, ticks, _) in enumerate(runs):
             q, qd = (scale * vectors(ticks, name)[:, joint] for name in ("q", "qd"))
             at = np.union1d(extremes(q, BUCKETS), extremes(qd, BUCKETS))
-            axis.plot(q[at], qd[at], color=one.colour, linestyle=DASHES[one.dash], label=one.case.cell.formulation)
+            axis.plot(
+                q[at],
+                qd[at],
+                color=one.colour,
+                linestyle=DASHES[one.dash],
+                label=one.case.cell.formulation,
+                linewidth=_nested(place, len(runs)),
+            )
+            seen.append(np.array([[q.min(), q.max()], [qd.min(), qd.max()]]))
+        _zoom(axis, np.array(seen))
         axis.set_xlabel(f"{scenario.robot.joint_names[joint]}: position [{unit}]")
         axis.set_ylabel(f"velocity [{unit}/s]")
     _legend(made, axes[0][0])
@@ -82,6 +99,19 @@ def _closed_loops(series: Sequence[Series], scenario: Scenario) -> list[tuple[Se
             if acceleration is not None:
                 runs.append((one, one.ticks, acceleration))
     return runs
+
+
+def _nested(place: int, count: int) -> float:
+    """Line width: runs that coincide are seen nonetheless, the first widest and the last on top."""
+    return 0.9 + 1.2 * (count - 1 - place)
+
+
+def _zoom(axis: Axes, seen: Array) -> None:
+    """Show where the runs were, with half as much again around; `seen` has shape (runs, 2, 2)."""
+    low, high = seen[:, :, 0].min(axis=0), seen[:, :, 1].max(axis=0)
+    room = np.maximum(0.5 * (high - low), 2.0)
+    axis.set_xlim(low[0] - room[0], high[0] + room[0])
+    axis.set_ylim(low[1] - room[1], high[1] + room[1])
 
 
 def _area(axis: Axes, scenario: Scenario, joint: int) -> None:

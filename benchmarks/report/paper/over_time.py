@@ -65,7 +65,7 @@ def _grid(
         return None
     formulations = list(dict.fromkeys(cell.formulation for cell in curves))
     solvers = list(dict.fromkeys(cell.solver for cell in curves))
-    made, axes = figure(len(solvers), len(formulations), 0.95, sharex=True, sharey=True)
+    made, axes = figure(len(solvers), len(formulations), 0.95, sharex=True, sharey="row")
     for axis in (axis for row in axes for axis in row):
         axis.set_visible(False)
     for cell, (one, (tick, values)) in curves.items():
@@ -76,13 +76,15 @@ def _grid(
         if kind == "line" and scenario.states is None:
             axis.plot(x, values, color=one.colour, linewidth=0.6)
         else:
-            axis.plot(x, values, ".", color=one.colour, markersize=1.5, markeredgewidth=0.0)
+            axis.plot(x, values, ".", color=one.colour, markersize=2.5, markeredgewidth=0.0)
         axis.set_title(f"{cell.formulation}, {cell.solver}", loc="left")
         if kind == "times":
             axis.set_yscale("log")
-        else:
-            axis.set_ylim(bottom=0.0)
         if row == len(solvers) - 1:
             axis.set_xlabel("time [s]" if scenario.states is None else "state")
+    if kind != "times":
+        # After all is drawn: setting a limit ends its adapting to what comes.
+        for row in axes:
+            row[0].set_ylim(bottom=0.0)
     made.supylabel(label, fontsize=8)
     return made

@@ -26,7 +26,7 @@ def scorecard_figure(rows: Sequence[Row]) -> Figure | None:
     axis.set_axis_off()
     text = [[row.formulation, f"{row.passed}/{row.measured}", *(mark.text for mark in row.marks)] for row in rows]
     colours = [["white", "white", *(_COLOURS[mark.kind] for mark in row.marks)] for row in rows]
-    heads = ["formulation", "passed", *(f"{one.number}. {one.key.replace('_', chr(10))}" for one in REQUIREMENTS)]
+    heads = ["formulation", "passed", *(f"{one.number}.\n{one.key.replace('_', chr(10))}" for one in REQUIREMENTS)]
     longest = max(len(row.formulation) for row in rows)
     first = min(0.32, 0.0085 * longest + 0.02) * 7.16 / WIDTH
     widths = [first, 0.055, *([(0.945 - first) / len(REQUIREMENTS)] * len(REQUIREMENTS))]
@@ -37,8 +37,8 @@ def scorecard_figure(rows: Sequence[Row]) -> Figure | None:
     table.set_fontsize(6)
     for (row, column), cell in table.get_celld().items():
         cell.set_linewidth(0.3)
-        cell.set_height((2.2 if row == 0 else 1.0) / (len(rows) + 2.2))
-        cell.get_text().set_wrap(row == 0)
+        cell.set_height((2.0 if row == 0 else 1.0) / (len(rows) + 2.0))
+        cell.get_text().set_fontsize(5.0 if row == 0 else 6.0)
         if column == 0:
             cell.get_text().set_horizontalalignment("left")
     return made
