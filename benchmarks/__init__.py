@@ -4,8 +4,9 @@ from .cells import STARTS, Block, Cell
 from .cluster import ClusterError
 from .compare import Comparison, compare
 from .conditions import conditions
-from .config import ConfigError, Product, SweepConfig, cells_of, load_config, make_config
+from .config import Product, SweepConfig, cells_of
 from .errors import CompareError, ReportError
+from .loading import ConfigError, load_config, make_config
 from .metrics import ON_LIMIT, REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
 from .store import Manifest, Outcome, Part, Store, StoreError

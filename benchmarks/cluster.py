@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import atexit
+import socket
 import sys
 import threading
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Final
+from urllib.parse import urlsplit
 
 from .messages import Ran, Refused
 from .processes import Worker
@@ -46,7 +48,8 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
         When distributed is not installed, or there is no scheduler or no worker there.
     """
     if find_spec("distributed") is None:
-        raise ClusterError("--scheduler needs Dask: pip install 'kinqp[cluster]'")
+        raise ClusterError("--scheduler: expected Dask to be installed, got nothing: pip install 'kinqp[cluster]'")
+    _check_reachable(scheduler)
     distributed: Any = import_module("distributed")  # which is not typed throughout
 
     try:
@@ -72,6 +75,21 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
                 yield _result(future, futures.pop(future))
         finally:
             client.cancel(list(futures))
+
+
+def _check_reachable(scheduler: str) -> None:
+    """Find out in plain words, before Dask tries for long and complains in its own."""
+    try:
+        parts = urlsplit(scheduler)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if not host or not port:
+        raise ClusterError(f"--scheduler: expected an address such as tcp://host:8786, got {scheduler!r}")
+    try:
+        socket.create_connection((host, port), timeout=_PATIENCE).close()
+    except OSError as error:
+        raise ClusterError(f"--scheduler: expected a Dask scheduler at {scheduler}, got: {error}") from error
 
 
 def _result(future: Any, task: Task) -> Ran | Recorded:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 from .cluster import on_a_cluster
 from .conditions import conditions, timing_core
-from .config import SweepConfig, make_config
+from .config import SweepConfig
+from .loading import make_config
 from .messages import Ran
 from .processes import Worker
 from .schedule import Recorded, Task, on_this_machine

@@ -77,7 +77,6 @@ def test_a_cluster_gives_the_same_and_a_lost_worker_costs_nothing(
     assert all(store.times(cell) is not None for cell in store.cells())
 
 
-def test_no_scheduler_is_one_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kinqp.benchmarks.cluster._PATIENCE", 0.5)
+def test_no_scheduler_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ClusterError, match=r"expected a Dask scheduler at tcp://127\.0\.0\.1:9, got"):
         sweep(TINY, tmp_path, scheduler="tcp://127.0.0.1:9")
