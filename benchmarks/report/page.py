@@ -233,7 +233,9 @@ def _tiles(total: int, count: dict[str, int], rows: Sequence[object]) -> list[di
             "By residuals that we compute, or a certificate where one is expected.",
             "good",
         ),
-        tile(count["unsolved"], "unsolved at times, and said so", "Some ticks, or all, ended without the right answer."),
+        tile(
+            count["unsolved"], "unsolved at times, and said so", "Some ticks, or all, ended without the right answer."
+        ),
         tile(
             count["dishonest"],
             "dishonest",

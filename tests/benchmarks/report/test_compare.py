@@ -70,7 +70,9 @@ def test_answers_are_compared_exactly() -> None:
     assert only(ticks(), gave_up) == ("failed ticks", "worse")
     assert only(gave_up, ticks()) == ("failed ticks", "better")
     lied = ticks(status=["solved"] * 5 + ["inaccurate"])
-    assert {(f.measure, f.verdict) for f in compare_ticks("cell", gave_up, lied, SCENARIO)} == {("dishonest ticks", "worse")}
+    assert {(f.measure, f.verdict) for f in compare_ticks("cell", gave_up, lied, SCENARIO)} == {
+        ("dishonest ticks", "worse")
+    }
 
 
 def test_the_right_answer_may_be_a_certificate() -> None:

@@ -58,12 +58,16 @@ def test_a_distribution_is_made_of_values_that_occurred(values: list[float]) -> 
 
 def test_the_far_end_of_a_distribution_is_dense() -> None:
     shares, _ = distribution(np.arange(10_000.0))
-    assert np.sum(shares > 0.99) >= 30
+    assert np.sum(shares > 0.99) >= 25
 
 
 @pytest.mark.parametrize(
     ("values", "options", "named"),
-    [([1.0], {"buckets": 0}, "buckets"), ([[1.0]], {"buckets": 1}, "values"), ([1.0, 2.0], {"buckets": 1, "group": [1, 0]}, "group")],
+    [
+        ([1.0], {"buckets": 0}, "buckets"),
+        ([[1.0]], {"buckets": 1}, "values"),
+        ([1.0, 2.0], {"buckets": 1, "group": [1, 0]}, "group"),
+    ],
 )
 def test_what_is_not_usable_is_named(values: list[float], options: dict[str, int], named: str) -> None:
     with pytest.raises(ValueError, match=named):
