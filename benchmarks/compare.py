@@ -119,7 +119,8 @@ def compare(
     common = [cell for cell in of_a if cell in set(of_b)]
     if not common:
         raise CompareError(
-            f"{a.folder} and {b.folder}: expected cells that both have run, got none; sweep the same configuration twice"
+            f"{a.folder} and {b.folder}: expected cells that both have run, got none; sweep the same configuration "
+            "twice"
         )
     warnings, same_machine = _conditions(a.manifest.conditions, b.manifest.conditions)
     judge_times = times and (same_machine or allow_other_machine)
@@ -178,7 +179,8 @@ def _about_times(ratios: list[float], cells: int) -> list[str]:
     drift = float(np.exp(np.median(np.log(ratios))))
     if not 0.95 < drift < 1.05:
         warnings.append(
-            f"half of all cells take {drift:.2f} times as long or longer (wall, typical tick): the machine's state, or code that all cells share, changed"
+            f"half of all cells take {drift:.2f} times as long or longer (wall, typical tick): the machine's state, or "
+            "code that all cells share, changed"
         )
     return warnings
 

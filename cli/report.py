@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
+from pathlib import Path  # noqa: TC003  # Typer reads annotations at run time
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -95,10 +95,10 @@ def _print(found: Comparison, *, show_all: bool) -> None:
             more = f", and {len(cells) - len(shown)} more (--all)" if len(shown) < len(cells) else ""
             console.print(f"only in {what} ({len(cells)}): {', '.join(shown)}{more}", markup=False)
     for verdict in ("worse", "changed", "better"):
-        some = found.of(verdict)  # type: ignore[arg-type]  # the names are those of Verdict
+        some = found.of(verdict)
         if some:
             console.print(_table(verdict, some, show_all=show_all or verdict == "worse"))
-    counts = ", ".join(f"{len(found.of(verdict))} {verdict}" for verdict in ("worse", "changed", "better"))  # type: ignore[arg-type]  # as above
+    counts = ", ".join(f"{len(found.of(verdict))} {verdict}" for verdict in ("worse", "changed", "better"))
     timed = f"{found.timed} with times" if found.times_compared else "times not compared"
     console.print(f"{found.compared} cells compared, {timed}: {counts}.", markup=False)
     if found.regressed:

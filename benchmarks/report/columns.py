@@ -49,11 +49,12 @@ _SPREAD: Final = (
 )
 _MAIN: Final = (
     Column("success", "right", "%", "main", "percent", "Ticks with the right answer by residuals that we compute."),
-    Column("false_solved", "false “solved”", "%", "main", "percent",
+    Column("false_solved", "false solved", "%", "main", "percent",
            "Ticks at which the solver claimed to have solved the problem, and had not: its honesty.", 0.0),
     Column("wall_p50", "time p50", "µs", "main", "us", "Median of update and solve through Python."),
     Column("wall_p99", "time p99", "µs", "main", "us", "99th percentile of update and solve through Python."),
-    Column("wall_late_1khz", "late at 1 kHz", "%", "main", "percent", "Solves through Python that took longer than 1 ms."),
+    Column("wall_late_1khz", "late at 1 kHz", "%", "main", "percent",
+           "Solves through Python that took longer than 1 ms."),
     Column("iterations_mean", "iter. mean", "", "main", "number", "Iterations per tick as the solver counts them."),
     Column("iterations_max", "iter. max", "", "main", "int", "Most iterations of any tick."),
     Column("peak_acceleration", "peak accel.", "of limit", "main", "number",
@@ -73,14 +74,17 @@ _ITERATIONS: Final = (
 )  # fmt: skip
 _ANSWERS: Final = (
     Column("success", "right", "%", "answers", "percent", "Ticks with the right answer by residuals that we compute."),
-    Column("false_solved", "false “solved”", "%", "answers", "percent", "Claimed solved, and was not.", 0.0),
-    Column("false_unsolvable", "false “unsolvable”", "%", "answers", "percent",
+    Column("false_solved", "false solved", "%", "answers", "percent", "Claimed solved, and was not.", 0.0),
+    Column("false_unsolvable", "false unsolvable", "%", "answers", "percent",
            "Claimed to have no solution, where there is one.", 0.0),
     Column("gave_up", "gave up", "%", "answers", "percent", "Ended without an answer, and said so."),
-    Column("agreement", "agrees", "%", "answers", "percent", "Commands that agree with the reference, of those compared."),
+    Column("agreement", "agrees", "%", "answers", "percent",
+           "Commands that agree with the reference, of those compared."),
     Column("compared", "compared", "%", "answers", "percent", "Ticks with a reference to compare with."),
-    Column("reference_error_p99", "off reference p99", "rad/s", "answers", "number", "99th percentile of the difference."),
-    Column("reference_error_max", "off reference max", "rad/s", "answers", "number", "Largest difference of a command."),
+    Column("reference_error_p99", "off reference p99", "rad/s", "answers", "number",
+           "99th percentile of the difference."),
+    Column("reference_error_max", "off reference max", "rad/s", "answers", "number",
+           "Largest difference of a command."),
 )  # fmt: skip
 _ERRORS: Final = (
     Column("proposed_excess", "over bound", "rad/s", "errors", "number",
@@ -89,23 +93,29 @@ _ERRORS: Final = (
     Column("proposed_fixed_error", "locked rows", "m/s, rad/s", "errors", "number",
            "Largest error of a locked row of what the solver proposed."),
     Column("off_line", "off the line", "m/s", "errors", "number", "Largest velocity sent along a locked translation."),
-    Column("off_orientation", "off orientation", "rad/s", "errors", "number", "Largest velocity sent about a locked axis."),
+    Column("off_orientation", "off orientation", "rad/s", "errors", "number",
+           "Largest velocity sent about a locked axis."),
     Column("not_finite", "not finite", "%", "errors", "percent", "Ticks whose proposal was not finite.", 0.0),
-    Column("task_error_linear", "task error", "m/s", "errors", "number", "Mean norm of the Cartesian error, translations."),
-    Column("task_error_angular", "task error", "rad/s", "errors", "number", "Mean norm of the Cartesian error, rotations."),
+    Column("task_error_linear", "task error", "m/s", "errors", "number",
+           "Mean norm of the Cartesian error, translations."),
+    Column("task_error_angular", "task error", "rad/s", "errors", "number",
+           "Mean norm of the Cartesian error, rotations."),
     Column("time_lost", "time lost", "s", "errors", "number", "How far the tool is behind the hand in the end."),
 )  # fmt: skip
 _MOTION: Final = (
     Column("peak_speed", "peak speed", "of limit", "motion", "number", "Largest joint velocity over its limit."),
-    Column("peak_acceleration", "peak accel.", "of limit", "motion", "number", "Largest joint acceleration over its limit."),
+    Column("peak_acceleration", "peak accel.", "of limit", "motion", "number",
+           "Largest joint acceleration over its limit."),
     Column("watched_acceleration", "of watched", "of limit", "motion", "number", "The same of the watched joints."),
-    Column("limit_overshoot", "overshoot", "rad", "motion", "number", "Furthest that a joint went beyond a position limit."),
+    Column("limit_overshoot", "overshoot", "rad", "motion", "number",
+           "Furthest that a joint went beyond a position limit."),
     Column("on_limit", "on limit", "%", "motion", "percent", "Ticks with a watched joint within 1e-6 of a limit."),
     Column("closest", "closest", "rad", "motion", "number", "Smallest distance of a watched joint to a limit."),
     Column("chatter", "chatter", "1/s", "motion", "number",
            "Sign changes of joint accelerations with both sides above 1 % of the limit."),
-    Column("jumps", "jumps", "1/s", "motion", "number", "Ticks at which a joint's command changes by more than 2 qdd_max dt."),
-    Column("sigma_min", "σ min", "", "motion", "number", "Smallest singular value of the guided rows met."),
+    Column("jumps", "jumps", "1/s", "motion", "number",
+           "Ticks at which a joint's command changes by more than 2 qdd_max dt."),
+    Column("sigma_min", "\u03c3 min", "", "motion", "number", "Smallest singular value of the guided rows met."),
 )  # fmt: skip
 
 
@@ -150,7 +160,9 @@ def _times() -> tuple[Column, ...]:
 
 def _requirements() -> tuple[Column, ...]:
     return tuple(
-        Column(f"requirement_{one.key}", f"{one.number}. {one.key.replace('_', ' ')}", one.unit.strip("-"), "requirements", "number",
+        Column(f"requirement_{one.key}", f"{one.number}. {one.key.replace('_', ' ')}", one.unit.strip("-"),
+           "requirements",
+               "number",
                f"{one.text}: {one.definition}.", None if one.at_least else one.threshold)
         for one in REQUIREMENTS
     )  # fmt: skip

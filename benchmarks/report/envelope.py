@@ -79,6 +79,7 @@ def envelope(scenario: Scenario, joint: int) -> Envelope | None:
 
 def _bounds(name: str, q: Array, limits: dict[str, float], dt: float, scale: float) -> tuple[Array, Array]:
     at = ca.SX.sym("q")
-    given = [ca.SX(limits[key]) for key in ("q_min", "q_max", "qd_max", "qdd_max")]
-    lower, upper = ca.Function("bounds", [at], list(velocity_bounds(name, at, *given, ca.SX(dt))))(q[None, :])
+    q_min, q_max, qd_max, qdd_max = (ca.SX(limits[key]) for key in ("q_min", "q_max", "qd_max", "qdd_max"))
+    both = velocity_bounds(name, at, q_min, q_max, qd_max, qdd_max, ca.SX(dt))
+    lower, upper = ca.Function("bounds", [at], list(both))(q[None, :])
     return scale * np.array(lower).ravel(), scale * np.array(upper).ravel()

@@ -15,12 +15,17 @@ if TYPE_CHECKING:
     from .source import Case
 
 _ALWAYS: Final = (
-    "Closed loops are simulated: joints follow their commands exactly, nothing is measured, and there is no admittance or human in the "
+    "Closed loops are simulated: joints follow their commands exactly, nothing is measured, and there is no "
+    "admittance or human in the "
     "loop.",
-    "The reference that commands are compared with is this project's own active set at its tightest, accepted where its residuals "
-    "are below 1e-12. That it agrees with itself says little; that other methods agree with it says that both are right.",
-    "Iterations of different methods are different work: compare their numbers within a method, and times between methods.",
-    "Times through Python hold what a call from Python costs, which is most of the time of the fastest solvers. They are no worst-case "
+    "The reference that commands are compared with is this project's own active set at its tightest, accepted "
+    "where its residuals "
+    "are below 1e-12. That it agrees with itself says little; that other methods agree with it says that both "
+    "are right.",
+    "Iterations of different methods are different work: compare their numbers within a method, and times "
+    "between methods.",
+    "Times through Python hold what a call from Python costs, which is most of the time of the fastest solvers. "
+    "They are no worst-case "
     "execution times: the largest of so many samples is that of this machine on that day.",
     "All times are of one machine. Rank solvers by ratios on the same problems, not by seconds from two reports.",
     "Joint acceleration limits of the KUKA arms are this project's choice (10 rad/s²): KUKA publishes none.",
@@ -33,11 +38,13 @@ def limitations(manifest: Manifest, cases: Sequence[Case], buckets: int) -> list
     found = list(_ALWAYS)
     stand_ins = [f"{one.number}" for one in REQUIREMENTS if one.stand_in]
     found.append(
-        f"Requirements {', '.join(stand_ins)} can't be measured from a sweep; their columns are the closest that can, as defined below the "
+        f"Requirements {', '.join(stand_ins)} can't be measured from a sweep; their columns are the closest that "
+        "can, as defined below the "
         "scorecard."
     )
     found.append(
-        f"Curves are thinned to {buckets} buckets of neighbouring ticks, of which the smallest and the largest value are drawn: no spike is "
+        f"Curves are thinned to {buckets} buckets of neighbouring ticks, of which the smallest and the largest "
+        "value are drawn: no spike is "
         "lost, and every point drawn was measured."
     )
     if manifest.conditions.get("timing", "").startswith("not"):
@@ -47,7 +54,8 @@ def limitations(manifest: Manifest, cases: Sequence[Case], buckets: int) -> list
     )
     if sampled:
         found.append(
-            f"Too slow for closed loops of their own, and asked some of the reference's states instead: {', '.join(sampled)}. "
+            "Too slow for closed loops of their own, and asked some of the reference's states instead: "
+            f"{', '.join(sampled)}. "
             "They have no accelerations and no phase plots."
         )
     restless = [str(case.cell) for case in cases if case.outcome.timing and not case.outcome.timing.deterministic]

@@ -197,7 +197,8 @@ def _render(
     return template.render(
         title=f"kinqp: {names[0]} formulations, {names[1]} solvers, {names[2]} scenarios",
         heading="Resolving a hand-guided arm's motion, measured",
-        lead=f"{names[0]} formulations × {names[1]} solvers × {names[2]} scenarios in {len(cells):,} cells, measured on "
+        lead=f"{names[0]} formulations \u00d7 {names[1]} solvers \u00d7 {names[2]} scenarios in {len(cells):,} cells, "
+        "measured on "
         f"{conditions.get('cpu', 'an unknown CPU')}, {conditions.get('date', 'at an unknown date')}.",
         tiles=_tiles(len(cells), count, rows),
         score=rows,
@@ -209,7 +210,8 @@ def _render(
         limitations=limitations(manifest, cases, buckets),
         conditions=list(conditions.items()),
         settings=settings(manifest),
-        footer=f"Written by kinqp from a sweep of {conditions.get('date', 'unknown date')}, revision {conditions.get('git', 'unknown')}.",
+        footer=f"Written by kinqp from a sweep of {conditions.get('date', 'unknown date')}, "
+        f"revision {conditions.get('git', 'unknown')}.",
         css=Markup((assets / "page.css").read_text(encoding="utf-8")),  # noqa: S704  # ours
         data=Markup(text),  # noqa: S704  # escaped above
         curves=packed_curves,

@@ -54,7 +54,7 @@ def scorecard_rows(records: pl.DataFrame) -> list[Row]:
         for each in REQUIREMENTS:
             value, passes = one[each.key], one[f"{each.key}_pass"]
             kind: Kind = "none" if passes is None else "pass" if passes else "fail"
-            marks.append(Mark("–" if value is None else short(value), kind, one[f"{each.key}_scenario"] or ""))
+            marks.append(Mark("\u2013" if value is None else short(value), kind, one[f"{each.key}_scenario"] or ""))
         names = (one["formulation"], one["solver"], one["start"], one["scenarios"], one["passed"], one["measured"])
         rows.append(Row(*names, tuple(marks)))
     return sorted(rows, key=lambda row: (-row.passed, row.measured - row.passed))

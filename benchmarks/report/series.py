@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Index = NDArray[np.int64]
 
-# The three ways a solve is timed, and what each of them measures. They are never drawn on one axis: a solver's own timer
-# leaves out what the call from Python costs, and C has no such call.
+# The three ways a solve is timed, and what each of them measures. They are never drawn on one axis: a solver's own
+# timer leaves out what the call from Python costs, and C has no such call.
 CLOCKS: Final = {
     "wall": "update + solve through Python",
     "own": "the solver's own timer",

@@ -32,7 +32,7 @@ def distributions_figure(series: Sequence[Series]) -> Figure | None:
         return None
     formulations = list(dict.fromkeys(cell.formulation for cell, _ in curves))
     clocks = [clock for clock in CLOCKS if any(clock == key for _, key in curves)]
-    made, axes = figure(len(formulations), len(clocks), 1.7, sharey=True, sharex="col")
+    made, axes = figure(len(formulations), len(clocks), 1.7, sharey="all", sharex="col")
     for (cell, clock), (one, (shares, at)) in curves.items():
         axis = axes[formulations.index(cell.formulation)][clocks.index(clock)]
         axis.step(at, shares, where="post", color=one.colour, linestyle=DASHES[one.dash], label=cell.solver)
@@ -53,7 +53,7 @@ def profile_figure(profiles: Mapping[str, Profile], styles: Mapping[str, tuple[s
     there = {clock: profile for clock, profile in profiles.items() if profile.curves}
     if not there:
         return None
-    made, axes = figure(1, len(there), 2.4, sharey=True)
+    made, axes = figure(1, len(there), 2.4, sharey="all")
     for axis, (clock, profile) in zip(axes[0], there.items(), strict=True):
         for curve in profile.curves:
             colour, dash = styles[curve.solver]

@@ -33,7 +33,7 @@ def singular_figure(series: Sequence[Series], scenario: Scenario) -> Figure | No
     runs = _closed_loops(series, scenario)
     if not runs:
         return None
-    made, axes = figure(3, 1, 1.3, sharex=True)
+    made, axes = figure(3, 1, 1.3, sharex="all")
     for place, (one, ticks, acceleration) in enumerate(runs):
         curves = (ticks["sigma_min"].to_numpy(), acceleration, ticks["task_scale"].to_numpy())
         for (axis,), values in zip(axes, curves, strict=True):

@@ -65,7 +65,7 @@ def _grid(
         return None
     formulations = list(dict.fromkeys(cell.formulation for cell in curves))
     solvers = list(dict.fromkeys(cell.solver for cell in curves))
-    made, axes = figure(len(solvers), len(formulations), 0.95, sharex=True, sharey="row")
+    made, axes = figure(len(solvers), len(formulations), 0.95, sharex="all", sharey="row")
     for axis in (axis for row in axes for axis in row):
         axis.set_visible(False)
     for cell, (one, (tick, values)) in curves.items():
@@ -84,7 +84,7 @@ def _grid(
             axis.set_xlabel("time [s]" if scenario.states is None else "state")
     if kind != "times":
         # After all is drawn: setting a limit ends its adapting to what comes.
-        for row in axes:
-            row[0].set_ylim(bottom=0.0)
+        for line in axes:
+            line[0].set_ylim(bottom=0.0)
     made.supylabel(label, fontsize=8)
     return made

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -18,11 +18,13 @@ if TYPE_CHECKING:
 
     from ..source import Case
 
+Share = Literal["none", "all", "row", "col"]
+
 # Two columns of a conference paper [inch].
 WIDTH: Final = 7.16
 BUCKETS: Final = 600
 DASHES: Final = {"solid": "-", "dash": "--", "dot": ":"}
-_STYLE: Final = {
+_STYLE: Final[dict[Any, Any]] = {
     "font.size": 8, "axes.titlesize": 8, "axes.labelsize": 8, "xtick.labelsize": 7, "ytick.labelsize": 7,
     "legend.fontsize": 7, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
     "grid.linewidth": 0.5, "lines.linewidth": 1.0, "axes.linewidth": 0.6, "legend.frameon": False,
@@ -57,11 +59,17 @@ def style() -> Iterator[None]:
 
 
 def figure(
-    rows: int, columns: int, row_height: float, *, extra: float = 0.6, **options: object
+    rows: int,
+    columns: int,
+    row_height: float,
+    *,
+    extra: float = 0.6,
+    sharex: Share = "none",
+    sharey: Share = "none",
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Make a figure of the paper's width with a grid of axes; `options` go to `Figure.subplots`."""
+    """Make a figure of the paper's width with a grid of axes, rows of `row_height` and `extra` for the rest [inch]."""
     made = Figure(figsize=(WIDTH, rows * row_height + extra), layout="constrained")
-    axes = made.subplots(rows, columns, squeeze=False, **options)
+    axes = made.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     return made, [list(row) for row in axes]
 
 

@@ -12,17 +12,16 @@ from selenium.webdriver.chrome.service import Service
 
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 _FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--window-size=1366,900",
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync", "--window-size=1366,900",
 )  # fmt: skip
 
 
 def missing() -> str:
     """What of a browser and its driver is not here; empty where both are."""
     browser = next((name for name in _BROWSERS if shutil.which(name)), None)
-    names = [
-        name for name, there in (("chromium", browser), ("chromedriver", shutil.which("chromedriver"))) if not there
-    ]
+    found = {"chromium": browser, "chromedriver": shutil.which("chromedriver")}
+    names = [name for name, path in found.items() if not path]
     return f"no {' and no '.join(names)} (apt-get install chromium chromium-driver)" if names else ""
 
 

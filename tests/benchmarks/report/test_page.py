@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 from selenium.webdriver.support.ui import WebDriverWait
-from tests.benchmarks.report.browser import browser, missing
 
 from kinqp.benchmarks.report import write_report
+from tests.benchmarks.report.browser import browser, missing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing() or "a browser is here")
 
+# What stands where there is no number.
+NOTHING = "\u2013"
 PLOTS = ("map", "profile", "means", "iterations", "times", "cut", "cdf", "singular", "phase")
 TINY = "tests.benchmarks.tiny:"
 
@@ -79,7 +81,8 @@ def traces(driver: Chrome, plot: str) -> list[dict[str, object]]:
 
 def rows(driver: Chrome) -> list[list[str]]:
     return driver.execute_script(
-        "return Array.from(document.querySelectorAll('#cells-table tbody tr')).map(r => Array.from(r.cells).map(c => c.textContent))"
+        "return Array.from(document.querySelectorAll('#cells-table tbody tr'))"
+        ".map(r => Array.from(r.cells).map(c => c.textContent))"
     )
 
 
@@ -170,13 +173,13 @@ def test_chips_hide_and_show(opened: Chrome) -> None:
 
 def test_the_table_sorts_by_numbers_and_by_words(opened: Chrome) -> None:
     heading(opened, "iterations_mean")
-    there = [float(text) for text in column(opened, "iterations_mean") if text != "–"]
+    there = [float(text) for text in column(opened, "iterations_mean") if text != NOTHING]
     assert there == sorted(there)
     assert len(set(there)) > 1
     heading(opened, "iterations_mean")
     falling = column(opened, "iterations_mean")
-    assert [float(text) for text in falling if text != "–"] == sorted(there, reverse=True)
-    assert falling[-1] == "–", "what is missing comes last either way"
+    assert [float(text) for text in falling if text != NOTHING] == sorted(there, reverse=True)
+    assert falling[-1] == NOTHING, "what is missing comes last either way"
     heading(opened, "solver")
     names = column(opened, "solver")
     assert names == sorted(names, key=str.lower)
