@@ -38,9 +38,10 @@ def run_report(
     # Drawing takes a second to import, and only this command draws.
     from ..benchmarks.report import Selection, write_report
 
+    errors = Console(stderr=True)
     progress = Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        console=Console(stderr=True), transient=True,
+        console=errors, transient=True, disable=not errors.is_terminal,
     )  # fmt: skip
     with progress:
         bar = progress.add_task("reading")

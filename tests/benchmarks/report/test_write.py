@@ -23,7 +23,7 @@ TINY = "tests.benchmarks.tiny:"
 
 
 def test_the_paper_gets_every_figure_twice(swept: Store) -> None:
-    chosen = Selection(scenarios=(TINY + "tiny",), solvers=("active-set", "clarabel"))
+    chosen = Selection((TINY + "tiny",), ("joint-space",), ("active-set", "clarabel"))
     written = write_report(swept, selection=chosen)
     plain = "tests.benchmarks.tiny_tiny-"
     stems = {path.stem.removeprefix(plain) for path in written.figures}
