@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from ..baselines import available_baselines, get_baseline
 from ..benchmarks import (
     TABLE_WIDTH,
     ClusterError,
@@ -31,8 +32,12 @@ from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
+from .davinci import run_davinci
 from .interrupt import interruptible
 from .report import run_compare, run_report
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
@@ -65,11 +70,12 @@ app = typer.Typer(
 
 app.command("report")(run_report)
 app.command("compare")(run_compare)
+app.command("davinci")(run_davinci)
 
 
 @app.command("list")
 def list_all() -> None:
-    """List robots, modes, formulations, solvers and scenarios."""
+    """List robots, modes, formulations, baselines, solvers and scenarios."""
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(no_wrap=True)
@@ -79,6 +85,7 @@ def list_all() -> None:
         "robots": dict.fromkeys(available_robots(), ""),
         "modes": dict.fromkeys(MODE_NAMES, ""),
         "formulations": described,
+        "baselines": {name: _described(name, get_baseline) for name in available_baselines()},
         "solvers": dict.fromkeys(available_solvers(), ""),
         "scenarios": {name: get_scenario(name).description for name in available_scenarios()},
     }
@@ -175,10 +182,10 @@ def run_describe(
         Console(stderr=True, soft_wrap=True).print(f"Wrote {written}. Next: kinqp export, to have it as C.")
 
 
-def _described(formulation: str) -> str:
+def _described(name: str, get: Callable[[str], object] = get_formulation) -> str:
     """First line of a formulation's docstring; what is wrong with it, where another package's can't be loaded."""
     try:
-        return (type(get_formulation(formulation)).__doc__ or "").partition("\n")[0]
+        return (type(get(name)).__doc__ or "").partition("\n")[0]
     except PluginError as error:
         return str(error)
 

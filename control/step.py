@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
+from ..baselines import Baseline, BaselineStep, Tolerances, get_baseline, is_baseline
 from ..formulations import ABOVE, Evaluator, InputError, Mode, StepResult, get_formulation, levels_of, lower
-from ..solvers import Status, get_solver
+from ..solvers import PluginError, Status, get_solver
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -177,32 +178,60 @@ def _smallest_singular_value(matrix: Array) -> float:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
+@overload
 def make_step(
-    robot: Robot, formulation: str | Formulation, mode: str | Mode, solver: str | Solver = "active-set", **options: Any
-) -> InterpretedStep:
-    """Make the control cycle of a formulation on a robot in a mode, solved by any solver.
+    robot: Robot, formulation: Formulation, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> InterpretedStep: ...
+
+
+@overload
+def make_step(
+    robot: Robot, formulation: Baseline, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> BaselineStep: ...
+
+
+@overload
+def make_step(
+    robot: Robot, formulation: str, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> InterpretedStep | BaselineStep: ...
+
+
+def make_step(
+    robot: Robot,
+    formulation: str | Formulation | Baseline,
+    mode: str | Mode,
+    solver: str | Solver = "active-set",
+    **options: Any,
+) -> InterpretedStep | BaselineStep:
+    """Make the control cycle of a formulation on a robot in a mode, solved by any solver; or that of a baseline.
 
     Parameters
     ----------
     robot : Robot
         From `load_robot`.
-    formulation : str or Formulation
+    formulation : str, Formulation or Baseline
         A registered name, `module:Name`, or an instance; options in brackets, as in "cartesian-error(bounds=thesis)".
     mode : str or Mode
         As in `Mode.parse`, or an instance.
     solver : str or Solver
-        A registered name, `module:Name`, or an instance.
+        A registered name, `module:Name`, or an instance. A baseline has none, whatever is given.
     **options
         Handed to the solver, where it is given by name.
 
     Returns
     -------
-    InterpretedStep
+    InterpretedStep or BaselineStep
         Call it with (q, v).
+
+    Raises
+    ------
+    PluginError
+        When one of the names is not known, or options come with a baseline.
     """
-    return InterpretedStep(
-        robot,
-        get_formulation(formulation),
-        Mode.parse(mode) if isinstance(mode, str) else mode,
-        get_solver(solver, **options),
-    )
+    parsed = Mode.parse(mode) if isinstance(mode, str) else mode
+    if isinstance(formulation, Baseline) or (isinstance(formulation, str) and is_baseline(formulation)):
+        if options:
+            raise PluginError(f"baseline {formulation}: expected no options of a solver, got {', '.join(options)}")
+        tolerances = Tolerances(bound=BOUND_TOLERANCE, fixed=FIXED_TOLERANCE, fixed_floor=FIXED_FLOOR)
+        return BaselineStep(robot, get_baseline(formulation), parsed, tolerances)
+    return InterpretedStep(robot, get_formulation(formulation), parsed, get_solver(solver, **options))

@@ -63,6 +63,7 @@ class QpsolversBridge(Solver):
         self._options: dict[str, Any] = {
             **dict.fromkeys(self._known.tolerances, accepted),
             **dict.fromkeys(self._known.gap_tolerances, gap_tolerance(accepted)),
+            **self._known.settings,
             **given,
         }
         if given:

@@ -24,6 +24,8 @@ class Member:
         Its options that the tolerance and `gap_tolerance` are applied to.
     least_tolerance
         The smallest value that it accepts for them.
+    settings
+        Its options that are set otherwise than by default.
     names
         Lists the names of its settings, for solvers where qpsolvers ignores a wrong one.
     sparse, box
@@ -44,6 +46,7 @@ class Member:
     tolerances: tuple[str, ...] = ()
     gap_tolerances: tuple[str, ...] = ()
     least_tolerance: float = 0.0
+    settings: Mapping[str, object] = field(default_factory=dict)
     names: Callable[[], Iterable[str]] | None = None
     sparse: bool = False
     box: bool = True
@@ -87,6 +90,8 @@ MEMBERS: Mapping[str, Member] = {
     "highs": Member(
         tolerances=("primal_feasibility_tolerance", "dual_feasibility_tolerance"),
         least_tolerance=1e-10,
+        # On some QPs of robots it runs in circles without end; a second is a thousand times what others take.
+        settings={"time_limit": 1.0},
         names=_names_of("highspy", "HighsOptions"),
         sparse=True,
         semidefinite=True,

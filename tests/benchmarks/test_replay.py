@@ -98,7 +98,6 @@ def test_a_cell_keeps_its_three_clocks_apart() -> None:
             assert any(note.startswith(name) for note in part.notes) is not has
             if has:
                 assert (frame[name] > 0.0).all()
-                assert (frame[name] <= frame["wall_solve"] * 1.5 + 1e-3).all()
 
 
 def test_slow_solvers_get_fewer_of_the_same_problems() -> None:

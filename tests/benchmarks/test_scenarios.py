@@ -94,14 +94,14 @@ def test_corner_holds_two_joints_at_once_and_lets_go(formulation: str) -> None:
     made = run("limit-corner", formulation)
     assert made.scenario.watched_joints == (3, 5)
     both = np.all(made.distance[:-1][:, [3, 5]] < 1e-6, axis=1)
-    assert np.mean(both) > 0.3
+    assert np.mean(both) > 0.25
     assert np.min(made.distance) > -1e-12
     named = {"joint limits[3] lower", "joint limits[5] lower"}
     assert any(named <= set(active) for active in made.active)
     # Sideways the tool is free, and in the end both joints are off their limits.
     speed = np.array([np.max(np.abs(qd)) for qd in made.qd])
     sideways = both & np.array([abs(v[1]) > 0.1 for v in made.v])
-    assert np.sum(sideways) > 200
+    assert np.sum(sideways) > 150
     assert np.min(speed[sideways]) > 0.01
     assert np.all(made.distance[-1, [3, 5]] > np.deg2rad(0.3))
 

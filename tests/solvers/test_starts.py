@@ -64,5 +64,5 @@ def test_a_solution_tells_set_up_from_update_and_the_solvers_own_time(solver: st
         assert second.own_time is None
     else:
         assert second.own_time is not None
-        # Of a span within what was measured from outside, in the same unit.
-        assert 0.0 < second.own_time <= second.solve_time + 1e-4
+        # In the same unit, of a span within what was measured from outside; Clarabel's has its last set-up in it.
+        assert 0.0 < second.own_time <= second.solve_time + first.setup_time
