@@ -27,7 +27,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "my_formulations.py").write_text(block("py"))
     (folder / "pyproject.toml").write_text(block("toml"))
     # The page's sweep is the whole semicircle; two hundredths of a second of it will do here.
-    (folder / "sweep.toml").write_text(block("toml", 1) + 'scenarios = ["tests.benchmarks.tiny:tiny"]\nwarm_up = 2\n')
+    (folder / "sweep.toml").write_text(block("toml", 1) + 'scenarios = ["tests.benchmarks.tiny:tiny"]\n')
     return folder
 
 
