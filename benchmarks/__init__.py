@@ -2,8 +2,10 @@
 
 from .cells import STARTS, Block, Cell
 from .cluster import ClusterError
+from .compare import Comparison, compare
 from .conditions import conditions
 from .config import Product, SweepConfig, cells_of
+from .errors import CompareError, ReportError
 from .loading import ConfigError, load_config, make_config
 from .metrics import ON_LIMIT, REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
@@ -21,12 +23,15 @@ __all__ = [
     "Cell",
     "CellSummary",
     "ClusterError",
+    "CompareError",
+    "Comparison",
     "ConfigError",
     "Manifest",
     "Outcome",
     "Part",
     "Phase",
     "Product",
+    "ReportError",
     "Scenario",
     "ScenarioError",
     "Spread",
@@ -38,6 +43,7 @@ __all__ = [
     "cell_record",
     "cell_summary",
     "cells_of",
+    "compare",
     "conditions",
     "geometric_means",
     "get_scenario",

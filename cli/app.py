@@ -15,7 +15,9 @@ from ..baselines import available_baselines, get_baseline
 from ..benchmarks import (
     TABLE_WIDTH,
     ClusterError,
+    CompareError,
     ConfigError,
+    ReportError,
     Store,
     StoreError,
     available_scenarios,
@@ -32,6 +34,7 @@ from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
 from .davinci import run_davinci
 from .interrupt import interruptible
+from .report import run_compare, run_report
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
     ClusterError,
+    CompareError,
     CompilerError,
     ConfigError,
     CurvatureError,
@@ -48,6 +52,7 @@ USER_ERRORS = (
     OptionError,
     PlotError,
     PluginError,
+    ReportError,
     RobotError,
     StoreError,
     UnknownOptionError,
@@ -63,6 +68,8 @@ app = typer.Typer(
 )
 
 
+app.command("report")(run_report)
+app.command("compare")(run_compare)
 app.command("davinci")(run_davinci)
 
 
