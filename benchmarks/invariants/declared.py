@@ -1,0 +1,96 @@
+"""The declaration in cvxpy: its objective in numbers, and its answer, against the lowered QP."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any, Final
+
+import cvxpy
+import numpy as np
+
+from ...solvers import Status
+from ...solvers.solution import JUDGE_TOLERANCE
+from .answers import COST_TOLERANCE, cost_of, inputs_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ...control import InterpretedStep
+    from ...formulations.to_cvxpy import CvxpyProblem
+    from ...solvers import QP
+    from .answers import Answers
+    from .states import StateSet
+    from .tally import Row
+
+    Array = NDArray[np.float64]
+
+NUMBERS: Final = 1e-9
+_TOLERANCES: Final = dict.fromkeys(("tol_feas", "tol_gap_abs", "tol_gap_rel"), 1e-10)
+
+
+def judge_declared(
+    row: Row,
+    made: CvxpyProblem,
+    step: InterpretedStep,
+    states: StateSet,
+    given: Mapping[str, ArrayLike],
+    reference: Answers | None,
+) -> None:
+    """Check the cvxpy problem on all states; the cost against `reference`, where that solved the state."""
+    numbers, answer = [], []
+    refused = 0
+    for i in range(len(states.q)):
+        inputs = inputs_of(step.inputs, states, i, given)
+        qp = step.evaluate(states.q[i], states.v[i], **inputs).qp
+        made.set(q=states.q[i], v=states.v[i], **inputs)
+        numbers.append(_difference(made, qp, np.random.default_rng((i, qp.n))))
+        x = _solve(made)
+        if x is None:
+            refused += 1
+            answer.append(0.0)
+            continue
+        cost, scale = cost_of(qp, x)
+        primal = _primal(qp, x)
+        known = reference is not None and reference.status[i] is Status.SOLVED
+        answer.append(max(primal, abs(cost - reference.cost[i]) / scale if known and reference else 0.0))
+    row.notes["declared problem not solved"] = refused
+    row.check("cvxpy numbers", numbers, NUMBERS, states)
+    row.check("cvxpy answer", answer, max(COST_TOLERANCE, JUDGE_TOLERANCE), states)
+
+
+def _difference(made: CvxpyProblem, qp: QP, rng: np.random.Generator) -> float:
+    """Of the objective's change between two points, relative to its parts."""
+    one, two = rng.normal(size=(2, qp.n))
+    values = []
+    for x in (one, two):
+        _put(made, x)
+        values.append(float(made.problem.objective.args[0].value))
+    scale = 1.0 + abs(values[0]) + abs(values[1])
+    return abs((values[0] - values[1]) - (qp.objective(one) - qp.objective(two))) / scale
+
+
+def _put(made: CvxpyProblem, x: Array) -> None:
+    for name, where in made.lowered.variables.items():
+        made.variables[name].value = x[where]
+
+
+def _solve(made: CvxpyProblem) -> Array | None:
+    problem: Any = made.problem  # whose own annotations have gaps
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they repeat the status
+        try:
+            problem.solve(solver="CLARABEL", warm_start=False, **_TOLERANCES)
+        except (cvxpy.error.SolverError, ArithmeticError, ValueError):
+            return None
+    if problem.status != cvxpy.OPTIMAL:
+        return None
+    return np.concatenate([made.variables[name].value for name in made.lowered.variables])
+
+
+def _primal(qp: QP, x: Array) -> float:
+    """Largest violation of a row, relative to its terms."""
+    value = qp.stacked @ x
+    violation = np.maximum(np.maximum(value - qp.upper, qp.lower - value), 0.0)
+    return float(np.max(violation / np.maximum(np.abs(qp.stacked) @ (1.0 + np.abs(x)), 1e-300), initial=0.0))
