@@ -75,6 +75,8 @@ class Answers:
         Largest scaled residual of the answers used, over the levels; 0 where refused.
     cost, scale : ndarray, shape (N,)
         Objective of the first level's QP, NaN where refused; and what it is judged relative to.
+    price : ndarray, shape (N,)
+        Sum of its multipliers' sizes: what a row that is missed by one may change of the cost.
     """
 
     qd: Array
@@ -82,6 +84,7 @@ class Answers:
     residual: Array
     cost: Array
     scale: Array
+    price: Array
     status: list[Status] = field(default_factory=list)
     claimed: list[Status] = field(default_factory=list)
     raised: list[str] = field(default_factory=list)
@@ -110,6 +113,7 @@ def solve_all(
         np.zeros(count),
         np.full(count, np.nan),
         np.ones(count),
+        np.zeros(count),
     )
     recorder.solver = solver
     for i in range(count):
@@ -132,6 +136,7 @@ def solve_all(
             answers.residual[i] = max(residuals(qp, s.x, s.y, s.z, s.z_box).worst_scaled for qp, s in recorder.solved)
             qp, solution = recorder.solved[0]
             answers.cost[i], answers.scale[i] = cost_of(qp, solution.x)
+            answers.price[i] = sum(float(np.abs(part).sum()) for part in (solution.y, solution.z, solution.z_box))
     return answers
 
 

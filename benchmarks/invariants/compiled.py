@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
     from ...codegen import CompiledStep
     from ...control import InterpretedStep
-    from ...formulations import Instance
-    from ...solvers import Solution
+    from ...solvers import QP, Solution
     from .answers import Answers
     from .states import StateSet
     from .tally import Row
@@ -27,9 +26,11 @@ if TYPE_CHECKING:
 PARITY: Final = 1e-9
 #: Of a batch, how many ticks are called one by one too.
 SINGLE: Final = 300
-# Rounding of the data that conditioning amplifies, in units of the last place; and where no conditioning excuses more.
-_ROUNDING: Final = 8.0 * float(np.finfo(float).eps)
-_MOST_EXCUSED: Final = 1e-5
+# Rounding of the data that conditioning amplifies; and the most that it excuses.
+_ROUNDING: Final = 64.0 * float(np.finfo(float).eps)
+_MOST_EXCUSED: Final = 1e-2
+# Singular values below this share of the largest are rounding.
+_NOTHING: Final = 1e-15
 # Multipliers above this share of the largest make a row active.
 _ACTIVE: Final = 1e-12
 
@@ -114,25 +115,31 @@ def judge_parity(
 
 
 def excused(step: InterpretedStep, states: StateSet, index: int, given: Mapping[str, ArrayLike]) -> float:
-    """How far rounding of the data alone may move the command: by the conditioning of the active rows' KKT system."""
+    """How far rounding of the data alone may move the command, by `conditioning`."""
     inputs = inputs_of(step.inputs, states, index, given)
     instance = step.evaluate(states.q[index], states.v[index], **inputs)
     solution = get_solver("active-set").solve(instance.qp)
     if solution.status is not Status.SOLVED:
         return PARITY
-    return min(_ROUNDING * conditioning(instance, solution), _MOST_EXCUSED)
+    return min(_ROUNDING * conditioning(instance.qp, solution), _MOST_EXCUSED)
 
 
-def conditioning(instance: Instance, solution: Solution) -> float:
-    """Condition number of the KKT system of the rows that are active, rows and objective scaled to one."""
-    qp = instance.qp
+def conditioning(qp: QP, solution: Solution) -> float:
+    """How much rounding of the data is amplified on its way into the answer.
+
+    The larger one of two numbers: the condition of the active rows, each scaled to length one (nearly dependent rows
+    leave the point along their weak direction to rounding), and that of the Hessian within their null space. Both count
+    singular values down to where a row or a curvature is nothing but rounding.
+    """
     multipliers = np.concatenate((solution.y, solution.z, solution.z_box))
     active = np.abs(multipliers) > _ACTIVE * max(float(np.max(np.abs(multipliers), initial=0.0)), 1e-300)
     active[: qp.m_eq] = True
     rows = qp.stacked[active]
     rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    H = qp.H / max(float(np.max(np.abs(qp.H), initial=0.0)), 1e-300)
-    kkt = np.block([[H, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
-    sigma = np.linalg.svd(kkt, compute_uv=False)
-    # Rows that are one up to rounding leave the point where it is.
-    return float(sigma[0] / np.min(sigma[sigma > 1e-15 * sigma[0]]))
+    _, sigma, Vt = np.linalg.svd(rows, full_matrices=True)
+    rank = int(np.sum(sigma > _NOTHING * np.max(sigma, initial=0.0)))
+    weakest = float(sigma[0] / sigma[rank - 1]) if rank else 1.0
+    left = Vt[rank:]
+    curvature = np.linalg.eigvalsh(left @ qp.H @ left.T) if len(left) else np.ones(1)
+    least = max(float(curvature[0]), _NOTHING * max(float(curvature[-1]), 1e-300))
+    return max(weakest, float(curvature[-1]) / least)
