@@ -94,11 +94,11 @@ def make_blocks(
     constrained_share: int,
     seed: int,
 ) -> list[Block]:
-    """Blocks in the order in which they share their states: robot, mode, formulation."""
+    """Blocks in the order in which they share their states: mode, robot, formulation."""
     chosen = formulations or [*available_formulations(), *CONSTRAINED]
     blocks = []
-    for robot in robots:
-        for mode in modes or MODES:
+    for mode in modes or MODES:
+        for robot in robots:
             for name in chosen:
                 constrained = "+" in name
                 if constrained and not modes and mode not in CONSTRAINED_MODES:

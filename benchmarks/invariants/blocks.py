@@ -119,6 +119,7 @@ def run_block(block: Block) -> list[Row]:
         mine = states.first(row.states)
         compiled = judge_compiled(row, made_c, mine, GIVEN, stop[: row.states])
         if REFERENCE in interpreted:
+            recorder.solver = get_solver(REFERENCE)
             judge_parity(row, step, mine, GIVEN, interpreted[REFERENCE], compiled)
         row.cpu = process_time() - start
     return list(rows.values())

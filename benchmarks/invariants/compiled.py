@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ...solvers import Status, get_solver
+from ...solvers import Status
 from .answers import count_refused, inputs_of, judge_bad_input, judge_commands
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from ...codegen import CompiledStep
     from ...control import InterpretedStep
-    from ...solvers import QP, Solution
     from .answers import Answers
     from .states import StateSet
     from .tally import Row
@@ -26,13 +25,10 @@ if TYPE_CHECKING:
 PARITY: Final = 1e-9
 #: Of a batch, how many ticks are called one by one too.
 SINGLE: Final = 300
-# Rounding of the data that conditioning amplifies; and the most that it excuses.
-_ROUNDING: Final = 64.0 * float(np.finfo(float).eps)
-_MOST_EXCUSED: Final = 1e-2
-# Singular values below this share of the largest are rounding.
-_NOTHING: Final = 1e-15
-# Multipliers above this share of the largest make a row active.
-_ACTIVE: Final = 1e-12
+# A state is as good as its neighbours this far away [rad or m]: a tenth of a nanometre at the tool, and
+# where the C code begins to take coefficients of rows for rounding.
+BACKWARD: Final = 1e-10
+_NEIGHBOURS: Final = 6
 
 
 def judge_compiled(
@@ -105,41 +101,26 @@ def judge_parity(
     size = np.maximum(np.max(np.abs(wanted), axis=1, initial=0.0), 1.0)
     apart = np.where(both, np.max(np.abs(qd - wanted), axis=1) / size, 0.0)
     allowed = np.full(count, PARITY)
-    # One by one, because conditioning is only worth working out where it is called upon.
+    # Where a state's neighbours have other commands, the state itself does not say which is right.
     for i in np.flatnonzero(~(apart <= PARITY)):
-        allowed[i] = max(PARITY, excused(step, states, int(i), given))
-    row.notes["apart, by conditioning"] = int(np.sum((apart > PARITY) & (apart <= allowed)))
+        allowed[i] = max(PARITY, moved(step, states, int(i), given, wanted[i], BACKWARD))
+    row.notes["apart, no further than at states 1e-10 away"] = int(np.sum((apart > PARITY) & (apart <= allowed)))
     row.notes["solved by interpreted only"] = int(np.sum(known & ~solved))
     row.notes["solved by compiled only"] = int(np.sum(solved & ~known))
     row.check("parity", apart, allowed, states)
 
 
-def excused(step: InterpretedStep, states: StateSet, index: int, given: Mapping[str, ArrayLike]) -> float:
-    """How far rounding of the data alone may move the command, by `conditioning`."""
+def moved(
+    step: InterpretedStep, states: StateSet, index: int, given: Mapping[str, ArrayLike], command: Array, by: float
+) -> float:
+    """How far the interpreted command moves when the joints are elsewhere by `by` [rad or m], relative as in parity."""
+    rng = np.random.default_rng(index)
     inputs = inputs_of(step.inputs, states, index, given)
-    instance = step.evaluate(states.q[index], states.v[index], **inputs)
-    solution = get_solver("active-set").solve(instance.qp)
-    if solution.status is not Status.SOLVED:
-        return PARITY
-    return min(_ROUNDING * conditioning(instance.qp, solution), _MOST_EXCUSED)
-
-
-def conditioning(qp: QP, solution: Solution) -> float:
-    """How much rounding of the data is amplified on its way into the answer.
-
-    The larger one of two numbers: the condition of the active rows, each scaled to length one (nearly dependent rows
-    leave the point along their weak direction to rounding), and that of the Hessian within their null space. Both count
-    singular values down to where a row or a curvature is nothing but rounding.
-    """
-    multipliers = np.concatenate((solution.y, solution.z, solution.z_box))
-    active = np.abs(multipliers) > _ACTIVE * max(float(np.max(np.abs(multipliers), initial=0.0)), 1e-300)
-    active[: qp.m_eq] = True
-    rows = qp.stacked[active]
-    rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
-    _, sigma, Vt = np.linalg.svd(rows, full_matrices=True)
-    rank = int(np.sum(sigma > _NOTHING * np.max(sigma, initial=0.0)))
-    weakest = float(sigma[0] / sigma[rank - 1]) if rank else 1.0
-    left = Vt[rank:]
-    curvature = np.linalg.eigvalsh(left @ qp.H @ left.T) if len(left) else np.ones(1)
-    least = max(float(curvature[0]), _NOTHING * max(float(curvature[-1]), 1e-300))
-    return max(weakest, float(curvature[-1]) / least)
+    size = max(float(np.max(np.abs(command))), 1.0)
+    most = 0.0
+    for _ in range(_NEIGHBOURS):
+        q = states.q[index] + by * rng.choice([-1.0, 1.0], states.q.shape[1])
+        near = step(q, states.v[index], **inputs)
+        if near.status is Status.SOLVED:
+            most = max(most, float(np.max(np.abs(near.qd - command))) / size)
+    return most

@@ -31,7 +31,8 @@ INVARIANTS: Final[Mapping[str, str]] = {
     "repeat": "compiled: ticks that differ in a bit when repeated",
     "batch": "compiled: ticks of a batch that differ in a bit from a single call",
     "iterations": "compiled: iterations above the bound, of which this is the count",
-    "parity": "compiled: difference from the interpreted command, relative, at least 1 rad/s",
+    "parity": "compiled: difference from the interpreted command, relative, at least 1 rad/s; 1e-9 is allowed, or what "
+    "that command moves by when the joints move by 1e-10",
     "cvxpy numbers": "difference of the declared objective in cvxpy, relative",
     "cvxpy answer": "difference in cost, or scaled primal residual, of the declared problem solved by cvxpy",
 }
@@ -77,7 +78,7 @@ class Row(BaseModel):
         Of those, the ones of which the solver said "solved".
     notes : dict of str to int
         What is counted without being wrong: of compiled steps, commands further than 1e-9 from the interpreted ones
-        where the problem's conditioning accounts for it, and ticks that only one of the two solved.
+        where those move as far within 1e-10 rad, and ticks that only one of the two solved.
     checked : dict of str to Violation
         By name of invariant.
     cpu : float

@@ -208,7 +208,7 @@ class Spoilt:
         if self.what == "repeat" and self.calls == 2:
             result.qd[8, 0] = np.nextafter(result.qd[8, 0], 9.0)
         if self.what == "parity":
-            result.qd[0] += 2e-9 * max(1.0, float(np.abs(result.qd[0]).max()))
+            result.qd[0] += 1e-6 * max(1.0, float(np.abs(result.qd[0]).max()))
         return result
 
 
