@@ -58,6 +58,8 @@ def judge_declared(
         allowed.append(_ALLOWED)
         if reference is not None and reference.status[i] is Status.SOLVED:
             cost, scale = cost_of(qp, x)
+            # Its terms' constants are left out of the QP, and are part of what the solver's gap is relative to.
+            scale = max(scale, abs(float(made.problem.value)))
             answer[-1] = max(primal, abs(cost - reference.cost[i]) / scale)
             # Rows that are missed, if by what a solver may, are worth their multipliers.
             allowed[-1] = max(primal, _ALLOWED + missed * reference.price[i] / scale)

@@ -22,6 +22,7 @@ from kinqp.benchmarks.invariants.answers import (
     solve_all,
 )
 from kinqp.benchmarks.invariants.compiled import judge_compiled, judge_parity
+from kinqp.benchmarks.invariants.declared import judge_declared
 from kinqp.benchmarks.invariants.states import KINDS, StateSet, mode_rows
 from kinqp.formulations import Mode, get_formulation
 from kinqp.robots import RobotError
@@ -220,6 +221,24 @@ def test_a_compiled_step_is_checked(what: str) -> None:
     # A command that is moved breaks other things besides.
     others = {"batch", "error", "locked rows"} if what == "parity" else set()
     assert set(made.violations) - others == {what} - {""}, made.violations
+
+
+@pytest.mark.parametrize("spoilt_by", [0.0, 0.01])
+def test_a_declaration_that_is_another_one_in_cvxpy_is_named(spoilt_by: float) -> None:
+    step, answers = interpreted()
+    made = get_formulation("joint-space").to_cvxpy(arm("lbr_med14"), MODE)
+    honest = made.set
+
+    def another(**inputs: Array) -> None:
+        honest(**inputs)
+        for parameter in made.parameters.values():
+            parameter.value = parameter.value * (1.0 + spoilt_by)
+
+    made.set = another  # type: ignore[assignment]  # that is the point
+    found = row()
+    judge_declared(found, made, step, states().first(8), {}, answers)
+    assert ("cvxpy answer" in found.violations) == bool(spoilt_by)
+    assert not set(found.violations) - {"cvxpy answer", "cvxpy numbers"}
 
 
 def test_a_step_that_takes_nan_is_named() -> None:
