@@ -94,12 +94,12 @@ def run_block(block: Block) -> list[Row]:
             solver = get_solver("cvxpy:CLARABEL" if name == CVXPY else name)
             interpreted[name] = solve_all(step, recorder, solver, states.first(counts[name]), GIVEN)
             rows[name].cpu, start = process_time() - start, process_time()
-    best = _best(interpreted, len(states.q))
+    best, missed = _best(interpreted, len(states.q))
     for name, answers in interpreted.items():
         row, row.states = rows[name], counts[name]
         mine = states.first(row.states)
         judge_commands(row, mine, answers.qd, answers.eps, answers.solved, stop=stop[: row.states])
-        judge_answers(row, mine, answers, best[: row.states])
+        judge_answers(row, mine, answers, best[: row.states], missed[: row.states])
         recorder.solver = get_solver(REFERENCE)
         judge_bad_input(row, step, mine, GIVEN)
     start = process_time()
@@ -120,17 +120,20 @@ def run_block(block: Block) -> list[Row]:
         compiled = judge_compiled(row, made_c, mine, GIVEN, stop[: row.states])
         if REFERENCE in interpreted:
             recorder.solver = get_solver(REFERENCE)
-            judge_parity(row, step, mine, GIVEN, interpreted[REFERENCE], compiled)
+            judge_parity(row, (step, made_c), mine, GIVEN, interpreted[REFERENCE], compiled)
         row.cpu = process_time() - start
     return list(rows.values())
 
 
-def _best(interpreted: Mapping[str, Answers], count: int) -> Array:
-    """Lowest cost that any solver reached at each state; NaN where none solved it."""
-    best = np.full(count, np.nan)
+def _best(interpreted: Mapping[str, Answers], count: int) -> tuple[Array, Array]:
+    """Lowest cost that any solver reached at each state, NaN where none solved it; and by how much its rows are off."""
+    best, missed = np.full(count, np.nan), np.zeros(count)
     for answers in interpreted.values():
-        best[: len(answers.cost)] = np.fmin(best[: len(answers.cost)], answers.cost)
-    return best
+        first = slice(len(answers.cost))
+        lower = answers.solved & ~(answers.cost >= best[first])
+        best[first] = np.where(lower, answers.cost, best[first])
+        missed[first] = np.where(lower, answers.missed, missed[first])
+    return best, missed
 
 
 def _enough(answers: Answers | None, count: int) -> Answers | None:

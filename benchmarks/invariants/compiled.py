@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -28,7 +29,9 @@ SINGLE: Final = 300
 # A state is as good as its neighbours this far away [rad or m]: a tenth of a nanometre at the tool, and
 # where the C code begins to take coefficients of rows for rounding.
 BACKWARD: Final = 1e-10
-_NEIGHBOURS: Final = 6
+_NEIGHBOURS: Final = 12
+# Further apart than this no neighbour excuses anything.
+_FAR: Final = 1e-3
 
 
 def judge_compiled(
@@ -87,7 +90,7 @@ def _judge_bad_batch(row: Row, step: CompiledStep, states: StateSet, taken: Mapp
 
 def judge_parity(
     row: Row,
-    step: InterpretedStep,
+    steps: tuple[InterpretedStep, CompiledStep],
     states: StateSet,
     given: Mapping[str, ArrayLike],
     answers: Answers,
@@ -103,24 +106,29 @@ def judge_parity(
     allowed = np.full(count, PARITY)
     # Where a state's neighbours have other commands, the state itself does not say which is right.
     for i in np.flatnonzero(~(apart <= PARITY)):
-        allowed[i] = max(PARITY, moved(step, states, int(i), given, wanted[i], BACKWARD))
+        allowed[i] = max(PARITY, moved(steps, states, int(i), given))
     row.notes["apart, no further than at states 1e-10 away"] = int(np.sum((apart > PARITY) & (apart <= allowed)))
     row.notes["solved by interpreted only"] = int(np.sum(known & ~solved))
     row.notes["solved by compiled only"] = int(np.sum(solved & ~known))
     row.check("parity", apart, allowed, states)
+    row.check("apart", apart, _FAR, states)
 
 
 def moved(
-    step: InterpretedStep, states: StateSet, index: int, given: Mapping[str, ArrayLike], command: Array, by: float
+    steps: tuple[InterpretedStep, CompiledStep],
+    states: StateSet,
+    index: int,
+    given: Mapping[str, ArrayLike],
 ) -> float:
-    """How far the interpreted command moves when the joints are elsewhere by `by` [rad or m], relative as in parity."""
+    """How far either command moves when the joints are elsewhere by `BACKWARD`, relative as in parity."""
     rng = np.random.default_rng(index)
-    inputs = inputs_of(step.inputs, states, index, given)
-    size = max(float(np.max(np.abs(command))), 1.0)
+    calls = [functools.partial(step, **inputs_of(step.inputs, states, index, given)) for step in steps]
+    commands = [call(states.q[index], states.v[index]).qd for call in calls]
     most = 0.0
     for _ in range(_NEIGHBOURS):
-        q = states.q[index] + by * rng.choice([-1.0, 1.0], states.q.shape[1])
-        near = step(q, states.v[index], **inputs)
-        if near.status is Status.SOLVED:
-            most = max(most, float(np.max(np.abs(near.qd - command))) / size)
-    return most
+        q = states.q[index] + BACKWARD * rng.choice([-1.0, 1.0], states.q.shape[1])
+        for call, command in zip(calls, commands, strict=True):
+            near = call(q, states.v[index])
+            if near.status is Status.SOLVED:
+                most = max(most, float(np.max(np.abs(near.qd - command))))
+    return most / max(float(np.max(np.abs(commands[0]))), 1.0)

@@ -32,7 +32,8 @@ INVARIANTS: Final[Mapping[str, str]] = {
     "batch": "compiled: ticks of a batch that differ in a bit from a single call",
     "iterations": "compiled: iterations above the bound, of which this is the count",
     "parity": "compiled: difference from the interpreted command, relative, at least 1 rad/s; 1e-9 is allowed, or what "
-    "that command moves by when the joints move by 1e-10",
+    "either command moves by when the joints move by 1e-10",
+    "apart": "the same difference, whatever the neighbours say",
     "cvxpy numbers": "difference of the declared objective in cvxpy, relative",
     "cvxpy answer": "difference in cost, or scaled primal residual, of the declared problem solved by cvxpy",
 }

@@ -143,7 +143,7 @@ def test_a_wrong_answer_that_got_past_the_judge_is_a_violation() -> None:
     wrong = solve_all(step, recorder, cast("Solver", PassesTheJudge()), states(), {})
     made = row()
     judge_commands(made, states(), wrong.qd, wrong.eps, wrong.solved, stop=np.zeros_like(wrong.qd))
-    judge_answers(made, states(), wrong, interpreted()[1].cost)
+    judge_answers(made, states(), wrong, interpreted()[1].cost, interpreted()[1].missed)
     assert set(made.violations) == {"residuals", "cost"}
     moving = int(np.sum(states().v.any(axis=1)))
     assert made.violations["residuals"].count >= moving // 2
@@ -174,7 +174,7 @@ def spoilt(name: str) -> dict[str, Any]:
 def test_right_commands_pass() -> None:
     made = row()
     judge_commands(made, states(), **spoilt(""), stop=np.zeros_like(states().q))
-    judge_answers(made, states(), interpreted()[1], interpreted()[1].cost)
+    judge_answers(made, states(), interpreted()[1], interpreted()[1].cost, interpreted()[1].missed)
     assert not made.violations
     assert made.refused == {}
 
@@ -217,7 +217,7 @@ class Spoilt:
 def test_a_compiled_step_is_checked(what: str) -> None:
     made, step = row(), cast("Any", Spoilt(what))
     found = judge_compiled(made, step, states(), {}, np.zeros_like(states().q))
-    judge_parity(made, interpreted()[0], states(), {}, interpreted()[1], found)
+    judge_parity(made, (interpreted()[0], step), states(), {}, interpreted()[1], found)
     # A command that is moved breaks other things besides.
     others = {"batch", "error", "locked rows"} if what == "parity" else set()
     assert set(made.violations) - others == {what} - {""}, made.violations
