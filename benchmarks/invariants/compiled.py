@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -122,13 +121,15 @@ def moved(
 ) -> float:
     """How far either command moves when the joints are elsewhere by `BACKWARD`, relative as in parity."""
     rng = np.random.default_rng(index)
-    calls = [functools.partial(step, **inputs_of(step.inputs, states, index, given)) for step in steps]
-    commands = [call(states.q[index], states.v[index]).qd for call in calls]
+    both: tuple[InterpretedStep | CompiledStep, ...] = steps
+    q, v = states.q[index], states.v[index]
+    inputs = [inputs_of(step.inputs, states, index, given) for step in both]
+    commands = [step(q, v, **taken).qd for step, taken in zip(both, inputs, strict=True)]
     most = 0.0
     for _ in range(_NEIGHBOURS):
-        q = states.q[index] + BACKWARD * rng.choice([-1.0, 1.0], states.q.shape[1])
-        for call, command in zip(calls, commands, strict=True):
-            near = call(q, states.v[index])
-            if near.status is Status.SOLVED:
-                most = max(most, float(np.max(np.abs(near.qd - command))))
+        near = q + BACKWARD * rng.choice([-1.0, 1.0], q.size)
+        for step, taken, command in zip(both, inputs, commands, strict=True):
+            result = step(near, v, **taken)
+            if result.status is Status.SOLVED:
+                most = max(most, float(np.max(np.abs(result.qd - command))))
     return most / max(float(np.max(np.abs(commands[0]))), 1.0)
