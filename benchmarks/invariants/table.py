@@ -76,8 +76,12 @@ def _notes(rows: Sequence[Row]) -> str:
 
 
 def _skipped(rows: Sequence[Row]) -> str:
-    body = dict.fromkeys((row.formulation, row.robot, row.solver, row.skipped) for row in rows if row.skipped)
-    return "## Cells that can't be\n\n" + table(("formulation", "robot", "solver", "why"), body) if body else ""
+    groups: dict[tuple[str, str], dict[str, None]] = defaultdict(dict)
+    for row in rows:
+        if row.skipped:
+            groups[row.formulation, row.skipped][row.solver] = None
+    body = [(formulation, ", ".join(solvers), why) for (formulation, why), solvers in groups.items()]
+    return "## Cells that can't be\n\n" + table(("formulation", "solver", "why"), body) if body else ""
 
 
 def table(head: Sequence[str], body: Iterable[Sequence[object]]) -> str:
