@@ -11,6 +11,7 @@ import numpy as np
 
 from ...codegen import CurvatureError, compile_step
 from ...formulations import DeclarationError, Hierarchy, Mode, get_formulation
+from ...formulations.to_cvxpy import CvxpyProblem
 from ...robots import RobotError
 from ...solvers import get_solver
 from .answers import judge_answers, judge_bad_input, judge_commands, recorded_step, solve_all
@@ -106,6 +107,8 @@ def run_block(block: Block) -> list[Row]:
     if CVXPY in counts and not isinstance(formulation, Hierarchy):
         some = states.first(max(1, counts[CVXPY] // DECLARED_SHARE))
         made = formulation.to_cvxpy(arm(block.robot), mode)
+        if not isinstance(made, CvxpyProblem):
+            raise TypeError(f"{block.formulation}: expected one problem in cvxpy, got {type(made).__name__}")
         judge_declared(rows[CVXPY], made, step, some, GIVEN, _enough(interpreted.get(REFERENCE), len(some.q)))
         rows[CVXPY].cpu += process_time() - start
     if COMPILED in counts:
