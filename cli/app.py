@@ -140,7 +140,7 @@ def run_sweep(
         console.print(f"Interrupted; {out} keeps all cells done. Next: {again}")
         raise typer.Exit(130) from None
     console.print(sweep_table(store))
-    console.print(f"Wrote manifest.json, ticks and times of every cell to {out}. Next: read them with polars.")
+    console.print(f"Wrote manifest.json, ticks and times of every cell to {out}. Next: kinqp report {out}")
     if store.unwritten:
         what, why = next(iter(store.unwritten.items()))
         console.print(f"{len(store.unwritten)} results could not be written, as {what}: {why}.")
