@@ -33,7 +33,7 @@ def ingredients(robot: str, mode: str) -> Callable[..., tuple[Array, float, floa
     """Return (pull, governor, weakness) at (q, v, qd_prev)."""
     tick = Tick(arm(robot), Mode.parse(mode))
     measured = damping(tick)
-    outputs = [ca.densify(pull(tick, measured)), governor(tick, measured), measured.weakness]
+    outputs = [ca.densify(pull(tick, measured)), governor(tick, measured)[0], measured.weakness]
     names = [given.name for given in tick.inputs]
     function = ca.Function("ingredients", [given.symbol for given in tick.inputs], outputs, names, ["p", "g", "w"])
     defaults = {given.name: given.default for given in tick.inputs if given.default is not None}
