@@ -122,9 +122,9 @@ def governor(tick: Tick, measured: Damping) -> tuple[ca.SX, ca.SX]:
     r"""Share of the hand's velocity at which the rows leave the joints enough acceleration, and what they then need.
 
     Keeping a twist J qd while the arm moves takes the accelerations :math:`-J^\# \dot J \dot q`, whatever the QP
-    wishes, and they grow without bound where rows become dependent. They go with the square of the speed: it is reduced until
-    those for the locked rows alone take no more than the share `governor_share` of `qdd_max`, and those for all rows
-    no more than all of it, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
+    wishes, and they grow without bound where rows become dependent. They go with the square of the speed: it is
+    reduced until those for the locked rows alone take no more than the share `governor_share` of `qdd_max`, and those
+    for all rows no more than all of it, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
 
     Returns
     -------
