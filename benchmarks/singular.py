@@ -1,6 +1,7 @@
 """Formulations beside each other on singular paths: ``python -m kinqp.benchmarks.singular [ROBOT ...]``.
 
-The robots, by default LBR Med 14 and UR5e, are those of the random paths: names or URDF files. Each closed loop runs the compiled step at 1 kHz; the tables are those of docs/singularities.md.
+Each closed loop runs the compiled step at 1 kHz; the tables are those of docs/singularities.md. ROBOT are the arms of
+the random paths, as registered or ``FILE.urdf@TIP``; LBR Med 14 and UR5e unless told otherwise.
 """
 
 from __future__ import annotations
@@ -297,7 +298,8 @@ def main() -> None:
     for title, arguments in tables.items():
         rows = singular_sweep(*arguments)
         console.print(f"## {title}\n\n{to_markdown(rows)}\n", markup=False, highlight=False)
-    table = random_sweep([load_robot(name) for name in sys.argv[1:] or (ROBOT, "ur5e")], robust)
+    arms = [name.partition("@")[::2] for name in sys.argv[1:] or (ROBOT, "ur5e")]
+    table = random_sweep([load_robot(name, tip=tip or None) for name, tip in arms], robust)
     console.print(f"## Random paths\n\n{table}\n", markup=False, highlight=False)
     console.print("; ".join(f"{k} {v}" for k, v in conditions().items()) + ".", markup=False, highlight=False)
 

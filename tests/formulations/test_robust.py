@@ -60,7 +60,8 @@ def weak_state(robot: str, mode: str, seed: int) -> Array | None:
         sigma = np.linalg.svd(j_bar(robot, mode, q)[0], compute_uv=False)
         _, fixed = rows_at(read, Mode.parse(mode), q)
         locked = np.linalg.svd(fixed, compute_uv=False)[-1] if fixed.size else 1.0
-        if 0.02 < sigma[-1] < 0.08 and (len(sigma) == 1 or sigma[-2] > 3.0 * sigma[-1]) and locked > 0.2:
+        # Within the damping threshold of 0.2, but twenty times what counts as lost, where the way is a compromise.
+        if 0.08 < sigma[-1] < 0.16 and (len(sigma) == 1 or sigma[-2] > 3.0 * sigma[-1]) and locked > 0.2:
             return q
     return None
 
@@ -154,7 +155,7 @@ def test_side_once_chosen_is_kept_against_noise() -> None:
 def test_governor_leaves_enough_acceleration(robot: str, mode: str) -> None:
     rng, read = np.random.default_rng(4), Mode.parse(mode)
     slowed = 0
-    for _ in range(150):
+    for _ in range(300):
         q = arm(robot).random_configuration(rng)
         v = 3.0 * rng.normal(size=read.m_free)
         J_bar, _ = j_bar(robot, mode, q)
