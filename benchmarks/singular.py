@@ -19,6 +19,7 @@ from ..formulations import DEFAULT_DT
 from ..robots import load_robot
 from ..solvers import Status
 from .conditions import conditions
+from .metrics.motion import sign_changes
 from .scenarios.random_paths import RANDOM_MODES, RandomPath, random_paths
 from .scenarios.singular import ROBOT, SingularPath, hard_paths, singular_paths
 
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# A sign change of an acceleration counts where both sides exceed this share of the limit.
-CHATTER_SHARE: Final = 0.01
 SPEED: Final = 0.15
 _ONLY: Final = "damping={}, pull={}, rate_limit={}, smoothing={}, governor={}"
 # By what they are called in the tables.
@@ -185,19 +184,6 @@ def _summary(
         lost=float(np.sum(behind) * DEFAULT_DT / np.max(speed)),
         failed=failed,
     )
-
-
-def sign_changes(acceleration: Array) -> int:
-    """Count sign changes between ticks with both sides above `CHATTER_SHARE`, over all joints.
-
-    Parameters
-    ----------
-    acceleration : ndarray, shape (N, nv)
-        As shares of the limits.
-    """
-    before, after = acceleration[:-1], acceleration[1:]
-    large = np.minimum(np.abs(before), np.abs(after)) > CHATTER_SHARE
-    return int(np.sum((before * after < 0.0) & large))
 
 
 def _sigma_min(robot: Robot, mode: Mode, q: Array) -> float:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from ..robots import Robot
+    from .cvxpy_cascade import CvxpyCascade
     from .modes import Mode
     from .program import QuadraticProgram
     from .tick import Tick
@@ -110,20 +111,28 @@ class Formulation(ABC):
 
         return from_cvxpy(problem, command, name, feasible or {}, bounds)
 
-    def to_cvxpy(self, robot: Robot, mode: str | Mode) -> CvxpyProblem:
+    def to_cvxpy(self, robot: Robot, mode: str | Mode) -> CvxpyProblem | CvxpyCascade:
         """Give the problem as a DPP problem of cvxpy with named Parameters, for a robot in a mode.
+
+        Of a hierarchy there is one for each level, and a `solve` that takes them in order.
 
         Raises
         ------
         DeclarationError
             As of `lower`.
         """
+        from .cvxpy_cascade import CvxpyCascade
+        from .hierarchy import Hierarchy
         from .to_cvxpy import CvxpyProblem
 
+        if isinstance(self, Hierarchy):
+            return CvxpyCascade(self, robot, _mode(mode))
         return CvxpyProblem(self, robot, _mode(mode))
 
     def describe(self, robot: Robot, mode: str | Mode) -> str:
         """Write the problem as Markdown: in LaTeX, with its dimensions, named rows and run-time inputs.
+
+        Of a hierarchy, all levels in order.
 
         Raises
         ------

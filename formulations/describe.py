@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from .hierarchy import Hierarchy
 from .latex import Notation
 from .lowering import lower
 
@@ -23,24 +24,38 @@ _MANY: Final = 8
 
 def describe(formulation: Formulation, robot: Robot, mode: Mode) -> str:
     """Write a formulation on a robot in a mode as Markdown; see `Formulation.describe`."""
+    title = f"# `{formulation.name}` on `{robot.name}`, mode `{mode}`"
+    if not isinstance(formulation, Hierarchy):
+        return "\n\n".join([title, *_sections(formulation, robot, mode, "##")]) + "\n"
+    names = " > ".join(level.name for level in formulation.levels)
+    parts = [title, _summary(formulation), f"{len(formulation.levels)} QPs, solved in order: {names}."]
+    for level in formulation.levels:
+        parts += [f"## Level `{level.name}`", *_sections(level, robot, mode, "###")]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _summary(formulation: Formulation) -> str:
+    return (type(formulation).__doc__ or "").strip().partition("\n\n")[0].replace("\n", " ")
+
+
+def _sections(formulation: Formulation, robot: Robot, mode: Mode, heading: str) -> list[str]:
+    """One QP: what it is about, the problem, and its tables under headings of this depth."""
     lowered = lower(formulation, robot, mode)
     notation = Notation(lowered)
     problem = ["```math", *_problem(lowered, notation), "```"]
-    summary = (type(formulation).__doc__ or "").strip().partition("\n\n")[0].replace("\n", " ")
+    summary = _summary(formulation)
     legend = _table(("symbol", "stands for", "shape", "entries"), notation.legend)
-    parts = [
-        f"# `{formulation.name}` on `{robot.name}`, mode `{mode}`",
+    return [
         *([summary] if summary else []),
         "\n".join(problem),
         *([legend] if notation.legend else []),
-        "## Dimensions",
+        f"{heading} Dimensions",
         _table(("what", "count"), _dimensions(lowered)),
-        "## Rows",
+        f"{heading} Rows",
         _table(("name", "kind", "count", "where"), _rows(lowered)) if lowered.program.rows else "None.",
-        "## Run-time inputs",
+        f"{heading} Run-time inputs",
         _table(("name", "size", "unit", "default"), [_input(given) for given in lowered.inputs]),
     ]
-    return "\n\n".join(parts) + "\n"
 
 
 def _problem(lowered: Lowered, notation: Notation) -> list[str]:

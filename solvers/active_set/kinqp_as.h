@@ -25,7 +25,8 @@ typedef struct {
     double scale;        /* length that the data's own rounding is relative to, e.g. |v| [unit of w] */
     int max_iterations;  /* cap on steps, each adding or dropping one row [count] */
     int warm;            /* 1: start from the signs in `active`; 0: cold [flag] */
-    int polish;          /* 1: recompute w and z once from the final active set [flag] */
+    int polish;          /* recompute w and z once from the final active set: 0 never, 1 always, 2 if a row was dropped on
+                          * the way, since near-dependent rows leave their rounding in w as they pass through [choice] */
 } kinqp_as_options;
 
 typedef struct {

@@ -43,7 +43,7 @@ static size_t core_doubles(int n, int rows) { return kinqp_as_workspace_size(n, 
 size_t kinqp_qp_workspace_size(int n, int p, int m) {
     if (n < 0 || p < 0 || m < 0) return 0;
     const size_t a = (size_t)n, c = (size_t)m, e = (size_t)p + c + a;
-    const size_t doubles = 5 * a * a + c * a + e * a + (c + a) * a + 13 * a + c + 3 * e + 5 * (c + a);
+    const size_t doubles = 5 * a * a + c * a + 2 * e * a + (c + a) * a + 13 * a + c + 3 * e + 5 * (c + a);
     const size_t ints = 2 * e + 2 * (c + a) + a;
     return (doubles + core_doubles(n, m + n)) * sizeof(double) + ints * sizeof(int) + 2 * sizeof(double);
 }
@@ -59,6 +59,7 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     k->T = take(&d, n * n);
     k->C = take(&d, m * n);
     k->E = take(&d, e * n);
+    k->E0 = take(&d, e * n);
     k->M = take(&d, rows * n);
     k->scale = take(&d, n);
     k->g = take(&d, n);
@@ -103,7 +104,8 @@ static double row_value(const kinqp_qp_work *k, int row, int m, const double *x)
     return id < m ? kinqp_qp_dot(k->C + id * k->n, x, k->n) : x[id - m];
 }
 
-/* v := T'(H x + g + rows' duals): what stationarity still misses, in whitened coordinates. */
+/* v := T'(H x + g + rows' duals): what stationarity still misses, in whitened coordinates. The equalities' duals have no
+ * share in it but for rounding: they are put in so that large terms cancel entry by entry, before T mixes the entries. */
 static void whitened_residual(kinqp_qp_work *k, int m, const double *x, double *v) {
     for (int i = 0; i < k->n; ++i) k->grad[i] = k->g[i] + kinqp_qp_dot(k->H + i * k->n, x, k->n);
     for (int j = 0; j < k->state.k; ++j) {
@@ -111,6 +113,10 @@ static void whitened_residual(kinqp_qp_work *k, int m, const double *x, double *
         if (id >= m) k->grad[id - m] += k->rowz[row];
         else for (int i = 0; i < k->n; ++i) k->grad[i] += k->C[id * k->n + i] * k->rowz[row];
     }
+    for (int i = 0; i < k->n; ++i) k->s[i] = -k->grad[i];
+    kinqp_qp_equality_duals(k, k->s, k->ey);
+    for (int r = 0; r < k->equalities; ++r)
+        for (int i = 0; i < k->n; ++i) k->grad[i] += k->E0[r * k->n + i] * k->ey[r];
     whiten_vector(k, k->grad, v);
 }
 

@@ -18,6 +18,7 @@ typedef struct {
     double *g;        /* scaled linear cost (n,) */
     double *C;        /* scaled rows (m, n) */
     double *E;        /* scaled equality rows, then their Householder factors (p + m + n, n) */
+    double *E0;       /* scaled equality rows as they are (p + m + n, n) */
     double *e;        /* right-hand sides of E (p + m + n,) */
     double *efactor;  /* dual of the caller's row = efactor * dual of E's row (p + m + n,) */
     double *tau;      /* Householder factors (n,) */

@@ -221,6 +221,7 @@ static int remove_fixed(kinqp_qp_work *k, int m) {
 
 kinqp_status kinqp_qp_reduce(kinqp_qp_work *k, const kinqp_qp *qp, kinqp_qp_solution *s) {
     const int n = k->n;
+    for (int i = 0; i < k->equalities * n; ++i) k->E0[i] = k->E[i];
     kinqp_qp_factor_equalities(k);
     const int f = k->free = n - k->rank;
     for (int i = 0; i < n; ++i) k->x[i] = 0.0;

@@ -37,7 +37,8 @@ NAMES = (
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
 NARROW = 2.0
 # Compiled and interpreted are to agree to 1e-9; a last command that contradicts the locked rows by 1 rad/s, as in these
-# tests, makes the penalty's gradient 1e4 times the task's, and costs a digit.
+# tests, makes multipliers of 1e4 and more beside a joint weight of 1e-4. The compiled step, which doesn't refine, is
+# off by up to 2.5e-9 then (panda at q = 0), measured against the same active set solved in exact fractions.
 PARITY = 5e-9
 
 
@@ -127,23 +128,26 @@ def test_both_brake_alike_where_a_tick_is_not_solved() -> None:
 
 
 def test_a_capped_tick_of_a_feasible_step_is_safe() -> None:
-    """It may be refused as inaccurate (a large stretch makes the numbers large), but then it brakes."""
+    """And is not refused, however large its stretch; where nothing is left of the numbers, it brakes."""
     step = compiled(
         "lbr_med14", "joint-space-acceleration", "fix-orientation", quick=True, feasible=True, max_iterations=1
     )
     reference, seen = interpreted("lbr_med14", "joint-space-acceleration", "fix-orientation"), Counter[Status]()
     for kind, q, v, qd in ticks("lbr_med14", "fix-orientation", 60, seed=2):
-        result = step(q, v, qd_prev=qd)
-        seen[result.status] += 1
-        low, high = bounds_at(step.robot, q)
-        assert (result.qd >= low - 2e-9).all(), kind
-        assert (result.qd <= high + 2e-9).all(), kind
-        if result.status in (Status.SOLVED, Status.MAX_ITERATIONS):
-            _, locked = rows_at(step.robot, step.mode, q)
-            assert (np.abs(locked @ result.qd) <= 1e-9 * np.maximum(np.abs(locked) @ np.abs(result.qd), 1.0)).all()
-        else:
-            np.testing.assert_allclose(result.qd, reference.evaluate(q, v, qd_prev=qd).stop, rtol=1e-14, atol=1e-15)
-    assert seen[Status.MAX_ITERATIONS] > 5
+        for speed in (1.0, 1e12):
+            result = step(q, speed * v, qd_prev=qd)
+            seen[result.status] += speed == 1.0
+            low, high = bounds_at(step.robot, q)
+            assert (result.qd >= low - 2e-9).all(), kind
+            assert (result.qd <= high + 2e-9).all(), kind
+            if result.status in (Status.SOLVED, Status.MAX_ITERATIONS):
+                _, locked = rows_at(step.robot, step.mode, q)
+                assert (np.abs(locked @ result.qd) <= 1e-9 * np.maximum(np.abs(locked) @ np.abs(result.qd), 1.0)).all()
+            else:
+                stop = reference.evaluate(q, speed * v, qd_prev=qd).stop
+                np.testing.assert_allclose(result.qd, stop, rtol=1e-14, atol=1e-15)
+    assert seen[Status.MAX_ITERATIONS] > 30
+    assert set(seen) == {Status.SOLVED, Status.MAX_ITERATIONS}
 
 
 def test_batches_take_the_last_commands() -> None:

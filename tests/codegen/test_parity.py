@@ -5,8 +5,10 @@ from collections import Counter
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import null_space
 
 from kinqp.codegen import CompiledStep, TickResult
+from kinqp.control import InterpretedStep
 from kinqp.robots import Robot
 from kinqp.solvers import Status
 from tests.codegen.compiled import FORMULATIONS, SPEEDS, build_all, compiled, interpreted, near, ticks
@@ -18,6 +20,8 @@ TOLERANCE = 1e-9
 # Two commands that satisfy a locked row to this [m/s, rad/s] are equally right. An interior solver of equalities leaves
 # some 1e-14 of rounding per rad/s there.
 ROW_ROUNDING = 1e-12
+# What 64-bit numbers leave in a row of the task, per unit of the hand's velocity: some 50 units in the last place.
+TASK_ROUNDING = 1e-14
 
 
 def check_safe(step: CompiledStep, result: TickResult, q: Array, case: str, **limits: Array) -> None:
@@ -51,6 +55,20 @@ def weakest_locked(step: CompiledStep, q: Array) -> float:
     return float(np.min(sigma[sigma > 1e-9 * sigma[0]]))
 
 
+def weakest_equality(reference: InterpretedStep, q: Array, v: Array) -> float:
+    """Smallest singular value, zero aside, of what the QP's equalities ask of the command alone.
+
+    An equality in which an unbounded variable of its own stands, such as the Cartesian error, asks nothing of it. A
+    bounded one, such as the task's speed, may be at its bound and then takes no part in keeping the row.
+    """
+    instance = reference.evaluate(q, v)
+    moving = np.abs(instance.K).max(axis=0) > 0.0
+    bounded = np.isfinite(instance.qp.lb) | np.isfinite(instance.qp.ub)
+    rows = null_space(instance.qp.A[:, ~moving & ~bounded].T).T @ instance.qp.A[:, moving]
+    sigma = np.linalg.svd(rows, compute_uv=False) if rows.size else np.ones(1)
+    return float(np.min(sigma[sigma > 1e-9 * sigma[0]]))
+
+
 def check_parity(robot: str, formulation: str, mode: str, count: int) -> None:
     step, reference = compiled(robot, formulation, mode, quick=True), interpreted(robot, formulation, mode)
     kinds: Counter[str] = Counter()
@@ -62,8 +80,13 @@ def check_parity(robot: str, formulation: str, mode: str, count: int) -> None:
         check_safe(step, result, q, case)
         scale = max(1.0, float(np.abs(wanted.qd).max()))
         # Along a locked row of singular value sigma the commands differ by its rounding over sigma. Near q = 0 sigma
-        # is about 1e-6: that makes 1e-6, where all else is compared to 1e-9.
-        allowed = max(TOLERANCE, ROW_ROUNDING / weakest_locked(step, q)) if "zero" in kind else TOLERANCE
+        # is about 1e-6: that makes 1e-6, where all else is compared to 1e-9. Rows of a task that is an equality are no
+        # other: where limits stop it, its speed is zero to rounding, which is all that tells how fast to move along
+        # sigma.
+        allowed = TOLERANCE
+        if "zero" in kind:
+            rounding = TASK_ROUNDING * max(1.0, float(np.linalg.norm(v)))
+            allowed = max(allowed, ROW_ROUNDING / weakest_locked(step, q), rounding / weakest_equality(reference, q, v))
         assert np.abs(result.qd - wanted.qd).max() <= allowed * scale, case
         assert np.abs(result.eps - wanted.eps).max() <= 2.0 * allowed * scale, case
         kinds[kind] += 1

@@ -23,6 +23,7 @@ from kinqp.formulations import (
     levels_of,
     lower,
 )
+from kinqp.formulations.cvxpy_cascade import CvxpyCascade
 from kinqp.robots import load_robot
 from kinqp.solvers import QP, RawSolution, Solver, Status
 from tests.formulations.reference import adversarial_state, bounds_at, null_projector, rows_at
@@ -200,6 +201,40 @@ def test_it_is_not_taken_for_one_qp(tmp_path: Path) -> None:
         with pytest.raises(DeclarationError, match=SENTENCE):
             call()
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["lbr_med14", "ur5e"])
+def test_in_cvxpy_it_is_the_same_cascade(name: str) -> None:
+    """Level by level with another modeller and another solver, on random states and in limits."""
+    robot, rng = arm(name), np.random.default_rng(5)
+    written = Hierarchical().to_cvxpy(robot, "fix-orientation")
+    step = make_step(robot, "hierarchical", "fix-orientation")
+    assert isinstance(written, CvxpyCascade)
+    assert set(written.inputs) == {"q", "v", *step.inputs}
+    compared = held = 0
+    for _ in range(12):
+        q, v = robot.random_configuration(rng), rng.normal(size=3) * rng.choice([0.02, 0.5])
+        wanted = step(q, v, posture_gain=0.5)
+        if wanted.sigma_min < 0.05 or wanted.status is not Status.SOLVED:
+            continue
+        qd = written.solve("CLARABEL", q=q, v=v, posture_gain=0.5)
+        np.testing.assert_allclose(qd, wanted.qd, rtol=0, atol=2e-5)
+        compared += 1
+        held += bool(wanted.active)
+    assert all(level.problem.is_dpp() for level in written.levels)
+    assert compared >= 5
+    assert held >= 2
+    with pytest.raises(InputError, match="qd_above: expected an input among q"):
+        written.solve("CLARABEL", q=q, v=v, qd_above=np.zeros(robot.nv))
+
+
+def test_it_describes_all_levels_in_order() -> None:
+    text = Hierarchical().describe(ROBOT, "fix-orientation")
+    assert text.startswith("# `hierarchical` on `lbr_med14`, mode `fix-orientation`\n\nMode and limits always")
+    assert "2 QPs, solved in order: task > posture." in text
+    assert text.index("## Level `task`") < text.index("## Level `posture`")
+    assert text.count("```math") == text.count("### Dimensions") == text.count("### Run-time inputs") == 2
+    assert "| `qd_above` | 7 | rad/s or m/s | to be given at every tick |" in text.partition("## Level `posture`")[2]
 
 
 def test_levels_take_the_options() -> None:

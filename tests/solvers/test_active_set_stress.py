@@ -18,8 +18,6 @@ GIVING_UP = (Status.INACCURATE, Status.FAILED, Status.MAX_ITERATIONS)
 
 # (seed, number): problems that the solver gives up on and says so. One that is repaired makes the test fail.
 GIVEN_UP = {
-    # A cost that is constant on the feasible set, which starts at 0: x = 1e-65 is outside by all of its length.
-    (4, 9551): Status.INACCURATE,
     # Bounded only by a row of 1e-16, the rounding of a combination of others: the minimiser lies at 1e16.
     (6, 9309): Status.INACCURATE,
     # A diagonal Hessian over 1e8 with dependent equalities: 1.6e-9 is reached.
