@@ -6,10 +6,10 @@ OUT ?= results
 BIN := $(VENV)/bin
 # One worker per core, a file stays with one worker; pytest-benchmark has no place beside others.
 PARALLEL := -n auto --dist loadfile -p no:benchmark
-FOLDERS := robots solvers formulations codegen control benchmarks cli
+FOLDERS := robots solvers formulations codegen baselines control benchmarks cli configs
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
-.PHONY: help bench perf test test-long test-arm lint format types clean
+.PHONY: help bench perf test test-long test-arm browser lint format types clean
 
 help:
 	@echo "make bench      the semicircle: formulations x solvers, one table (results in $(OUT)/)"
@@ -17,6 +17,7 @@ help:
 	@echo "make test       the tests, under 5 minutes"
 	@echo "make test-long  the same tests with more states"
 	@echo "make test-arm   generated code and solver on 64- and 32-bit ARM, emulated (Debian packages: see the target)"
+	@echo "make browser    Chromium and its driver (Debian packages), where they are missing: tests of the report's page use them"
 	@echo "make lint       ruff"
 	@echo "make types      mypy --strict on the installed library"
 	@echo "make format     let ruff format the sources"
@@ -39,6 +40,12 @@ test-long: $(VENV)/.installed
 # apt-get install gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf libc6-dev-arm64-cross libc6-dev-armhf-cross qemu-user
 test-arm: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/codegen/test_arm.py
+
+# Without a browser the tests of the report's page are skipped, and say so.
+browser:
+	@command -v chromium >/dev/null && command -v chromedriver >/dev/null || { \
+	  sudo=$$(test "$$(id -u)" = 0 || echo sudo -n); \
+	  $$sudo apt-get update -q && $$sudo apt-get install -q -y --no-install-recommends chromium chromium-driver; }
 
 lint: $(VENV)/.dependencies
 	$(BIN)/ruff check .

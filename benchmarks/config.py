@@ -2,52 +2,58 @@
 
 from __future__ import annotations
 
-import tomllib
+from functools import cache
 from typing import TYPE_CHECKING, Annotated, Final
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
 from ..formulations import available_formulations, get_formulation
 from ..solvers import available_solvers, get_solver
+from ..solvers.plugins import PluginError
+from .cells import STARTS, Cell
 from .scenarios import available_scenarios, get_scenario
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
+#: In a list of names: all there are.
+ALL: Final = "all"
 
 
-class ConfigError(ValueError):
-    """A sweep's configuration can't be used; the message names the key, what was expected and what was got."""
+class Product(BaseModel):
+    """Every scenario x formulation x solver, each with every start that the solver has.
 
-
-class SweepConfig(BaseModel):
-    """A sweep: every scenario x formulation x solver is a cell.
-
-    Names take options in brackets: ``"clarabel(tolerance=1e-8)"``.
+    Names take options in brackets: ``"clarabel(tolerance=1e-8)"``; "all" stands for all there are.
 
     Parameters
     ----------
     scenarios, formulations, solvers : tuple of str
         At least one each.
-    repeats : int
-        Timed runs of each cell.
-    warm_up : int
-        Ticks run and thrown away before each timed run.
-    seed : int
-        Of the order of the runs.
+    starts : tuple of {"cold", "active-set", "solution"}
+        How the solvers start. Starts that a solver does not have are left out, and named in the manifest.
+    skip_missing : bool
+        Whether solvers that are not installed are left out, and named in the manifest, instead of being an error.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    skip_missing: bool = False
     scenarios: Names = ("semicircle",)
     formulations: Names = ("cartesian-error", "joint-space")
     solvers: Names = ("active-set", "thesis-active-set", "clarabel", "piqp")
-    repeats: Annotated[int, Field(ge=1)] = 3
-    warm_up: Annotated[int, Field(ge=0)] = 200
-    seed: Annotated[int, Field(ge=0)] = 0
+    starts: Names = ("cold",)
 
-    @field_validator("scenarios", "formulations", "solvers")
+    @field_validator("scenarios", "formulations", "solvers", mode="after")
+    @classmethod
+    def _expanded(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        if ALL not in names:
+            return names
+        # What is named beside "all" is meant beside it: a solver with options, a module's own.
+        everything = CHOICES[str(info.field_name)]()
+        return (*everything, *(name for name in names if name != ALL and name not in everything))
+
+    @field_validator("scenarios", "formulations", "solvers", "starts")
     @classmethod
     def _each_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -71,52 +77,140 @@ class SweepConfig(BaseModel):
 
     @field_validator("solvers")
     @classmethod
-    def _solvers_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _solvers_exist(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            _checked_solver(name)
+            if not (info.data.get("skip_missing") and missing(name)):
+                starts_of(name)
         return names
 
+    @field_validator("starts")
+    @classmethod
+    def _starts_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in STARTS:
+                raise ValueError(f"expected starts among {', '.join(STARTS)}, got {name!r}")
+        return names
 
-def _checked_solver(name: str) -> None:
+    def cells(self) -> tuple[Cell, ...]:
+        """Its cells in the order of its lists."""
+        return tuple(Cell(*names) for names in self._combined() if names[3] in self._starts(names[2]))
+
+    def skipped(self) -> dict[str, str]:
+        """What is left out of the product, as "solver from last start", and why."""
+        without = {solver: why for solver in self.solvers if (why := missing(solver))}
+        return without | {
+            f"{solver} from last {start}": f"{solver} starts {', '.join(starts_of(solver))} only"
+            for solver in self.solvers
+            for start in self.starts
+            if solver not in without and start not in starts_of(solver)
+        }
+
+    def _starts(self, solver: str) -> tuple[str, ...]:
+        return () if missing(solver) else starts_of(solver)
+
+    def _combined(self) -> list[tuple[str, str, str, str]]:
+        return [
+            (scenario, formulation, solver, start)
+            for scenario in self.scenarios
+            for formulation in self.formulations
+            for solver in self.solvers
+            for start in self.starts
+        ]
+
+
+class SweepConfig(Product):
+    """A sweep: a product of names, further products, and how they are measured.
+
+    Parameters
+    ----------
+    more : tuple of Product
+        Further products, ``[[more]]`` in TOML; a cell that is in several is run once.
+    repeats : int
+        Timed visits of each cell.
+    timing_ticks : int
+        How many of a block's problems are timed at most, in windows of `timing_window` consecutive ones spread over
+        the run.
+    timing_window : int
+        Ticks in a row; each window begins with one more, which is a full set-up.
+    timing_budget : float
+        Time for the timed solves of one cell, over all repeats [s]: slower solvers get fewer windows.
+    sampled : tuple of str
+        Solvers too slow for closed loops of their own: they are asked `samples` of the reference's states instead.
+    samples : int
+        How many.
+    cell_timeout : float
+        A solver that takes longer for its run or for one timed visit is stopped, and its cell has failed [s].
+    seed : int
+        Of the order of the visits and the choice of windows.
+    """
+
+    more: tuple[Product, ...] = ()
+    repeats: Annotated[int, Field(ge=1)] = 20
+    timing_ticks: Annotated[int, Field(ge=1)] = 1000
+    timing_window: Annotated[int, Field(ge=1)] = 20
+    timing_budget: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 4.0
+    sampled: tuple[str, ...] = ()
+    samples: Annotated[int, Field(ge=1)] = 200
+    cell_timeout: Annotated[float, Field(gt=0.0, allow_inf_nan=False)] = 120.0
+    seed: Annotated[int, Field(ge=0)] = 0
+
+    @field_validator("sampled")
+    @classmethod
+    def _sampled_exist(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        for name in names:
+            if not (info.data.get("skip_missing") and missing(name)):
+                starts_of(name)
+        return names
+
+    def products(self) -> tuple[Product, ...]:
+        """All products."""
+        return (self, *self.more)
+
+
+def cells_of(config: SweepConfig) -> tuple[Cell, ...]:
+    """All cells of a sweep, each once: block by block, in the order in which blocks are first named."""
+    blocks: dict[object, dict[Cell, None]] = {}
+    for product in config.products():
+        for cell in product.cells():
+            blocks.setdefault(cell.block, {})[cell] = None
+    return tuple(cell for cells in blocks.values() for cell in cells)
+
+
+def skipped_of(config: SweepConfig) -> dict[str, str]:
+    """What the products leave out, and why; see `Product.skipped`."""
+    return {what: why for product in config.products() for what, why in product.skipped().items()}
+
+
+@cache
+def starts_of(solver: str) -> tuple[str, ...]:
+    """Return the starts that a solver has.
+
+    Raises
+    ------
+    ValueError
+        When there is no such solver, or its options are wrong.
+    """
     try:
-        get_solver(name)
+        return ("cold", *get_solver(solver).starts)
     except TypeError as error:
         # pydantic reports ValueErrors only; an unknown option is a TypeError as it is for any Python call.
         raise ValueError(str(error)) from error
 
 
-CHOICES: Final = {
+@cache
+def missing(solver: str) -> str:
+    """Say why there is no such solver here; empty where there is one, whatever its options."""
+    try:
+        get_solver(solver)
+    except PluginError as error:
+        return str(error)
+    except (TypeError, ValueError):
+        return ""
+    return ""
+
+
+CHOICES: Final[dict[str, Callable[[], tuple[str, ...]]]] = {
     "scenarios": available_scenarios,
     "formulations": available_formulations,
-    "solvers": available_solvers,
+    "solvers": lambda: available_solvers(bridges=True),
 }
-
-
-def load_config(path: Path | None = None) -> SweepConfig:
-    """Read a sweep from a TOML file; without one, the shipped default.
-
-    Raises
-    ------
-    ConfigError
-        Naming the file, the key, and the choices.
-    """
-    if path is None:
-        return SweepConfig()
-    try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ConfigError(f"{path}: expected a readable TOML file: {error}") from error
-    return make_config(given, str(path))
-
-
-def make_config(given: dict[str, object], source: str = "sweep") -> SweepConfig:
-    """Check a sweep given as a mapping; errors name `source`, the key and the choices."""
-    try:
-        return SweepConfig.model_validate(given)
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        if first["type"] == "extra_forbidden":
-            known = ", ".join(SweepConfig.model_fields)
-            raise ConfigError(f"{source}: expected keys among {known}, got {key!r}") from error
-        raise ConfigError(f"{source}: {key}: {first['msg'].removeprefix('Value error, ')}") from error

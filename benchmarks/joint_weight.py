@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import track
 
 from ..control import InterpretedStep, make_step, simulate
+from ..formulations import JointSpace
 from ..solvers import Status, get_solver
 from .conditions import conditions
 from .scenarios import get_scenario
@@ -69,7 +70,7 @@ def joint_weight_study(every: int = 8, weights: Sequence[float] = WEIGHTS) -> li
         Joint weights.
     """
     scenario = get_scenario("semicircle")
-    step = make_step(scenario.robot, "joint-space", scenario.mode, REFERENCE)
+    step = make_step(scenario.robot, JointSpace(), scenario.mode, REFERENCE)
     run = simulate(step, scenario.guide, scenario.q0, scenario.duration, dt=scenario.dt)
     moving = np.flatnonzero(np.linalg.norm(run.v, axis=1) > 1e-3)[::every]
     return [_study(step, run.q[moving], run.v[moving], weight) for weight in track(weights, "weights", transient=True)]

@@ -1,10 +1,12 @@
-"""Formulations beside each other on singular paths: ``python -m kinqp.benchmarks.singular``.
+"""Formulations beside each other on singular paths: ``python -m kinqp.benchmarks.singular [ROBOT ...]``.
 
-Each closed loop runs the compiled step at 1 kHz; the tables are those of docs/singularities.md.
+Each closed loop runs the compiled step at 1 kHz; the tables are those of docs/singularities.md. ROBOT are the arms of
+the random paths, as registered or ``FILE.urdf@TIP``; LBR Med 14 and UR5e unless told otherwise.
 """
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -17,6 +19,8 @@ from ..formulations import DEFAULT_DT
 from ..robots import load_robot
 from ..solvers import Status
 from .conditions import conditions
+from .metrics.motion import sign_changes
+from .scenarios.random_paths import RANDOM_MODES, RandomPath, random_paths
 from .scenarios.singular import ROBOT, SingularPath, hard_paths, singular_paths
 
 if TYPE_CHECKING:
@@ -30,8 +34,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# A sign change of an acceleration counts where both sides exceed this share of the limit.
-CHATTER_SHARE: Final = 0.01
 SPEED: Final = 0.15
 _ONLY: Final = "damping={}, pull={}, rate_limit={}, smoothing={}, governor={}"
 # By what they are called in the tables.
@@ -115,15 +117,15 @@ class SingularRow:
 
 
 def singular_run(
-    step: CompiledStep, path: SingularPath, disturbance: Disturbance, *, name: str = "", every: int = 5
+    step: CompiledStep, path: SingularPath | RandomPath, disturbance: Disturbance, *, name: str = "", every: int = 5
 ) -> SingularRow:
     """Run one closed loop and sum it up.
 
     Parameters
     ----------
     step : CompiledStep
-        For `ROBOT` in the path's mode.
-    path : SingularPath
+        For the path's robot, in its mode.
+    path : SingularPath or RandomPath
     disturbance : Disturbance
         Its noise is drawn from a fixed seed.
     name : str
@@ -144,7 +146,7 @@ def singular_run(
     sigma, fixed_error, failed = np.inf, 0.0, 0
     for tick in range(round(path.duration(disturbance.speed) / dt)):
         measured = q + disturbance.noise * rng.normal(size=robot.nv)
-        v = np.concatenate([path.velocity(tick * dt, disturbance.speed), np.zeros(3)])[free]
+        v = path.twist(tick * dt, disturbance.speed)[free]
         result = step(measured, v, **given, **({"qd_prev": qd} if remembers else {}))
         qd = result.qd
         failed += result.status is not Status.SOLVED
@@ -184,19 +186,6 @@ def _summary(
     )
 
 
-def sign_changes(acceleration: Array) -> int:
-    """Count sign changes between ticks with both sides above `CHATTER_SHARE`, over all joints.
-
-    Parameters
-    ----------
-    acceleration : ndarray, shape (N, nv)
-        As shares of the limits.
-    """
-    before, after = acceleration[:-1], acceleration[1:]
-    large = np.minimum(np.abs(before), np.abs(after)) > CHATTER_SHARE
-    return int(np.sum((before * after < 0.0) & large))
-
-
 def _sigma_min(robot: Robot, mode: Mode, q: Array) -> float:
     rows = mode.twist_map_at(robot.pose(q)) @ robot.jacobian(q)
     guided = rows[list(mode.free_rows)]
@@ -233,6 +222,40 @@ def singular_sweep(
     return rows
 
 
+def random_sweep(robots: Sequence[Robot], formulations: Sequence[str], count: int = 3) -> str:
+    """Run formulations on random paths of every mode at both hand speeds; a Markdown table of what came out.
+
+    Parameters
+    ----------
+    robots : sequence of Robot
+    formulations : sequence of str
+        As in `singular_sweep`.
+    count : int
+        Paths for each robot, mode and speed.
+    """
+    head = (
+        "robot", "speed [m/s]", "formulation", "calm", "chatter [1/s]", "most", "peak qd/max", "peak qdd/max", "over",
+        "error [m/s]", "locked rows", "failed",
+    )  # fmt: skip
+    lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
+    cells = [(robot, name) for robot in robots for name in formulations]
+    for robot, name in track(cells, "random paths", transient=True):
+        rows = []
+        for seed, mode in enumerate(RANDOM_MODES):
+            step = compile_step(robot, VARIANTS.get(name, name), mode)
+            for path in random_paths(robot, mode, count, seed):
+                rows += [singular_run(step, path, Disturbance(speed=speed), every=100) for speed in (SPEED, 0.5)]
+        for speed, some in ((SPEED, rows[::2]), (0.5, rows[1::2])):
+            chatter, peak = [row.chatter for row in some], [row.peak_acceleration for row in some]
+            lines.append(
+                f"| {robot.name} | {speed} | {name} | {chatter.count(0.0)} of {len(some)} | {np.mean(chatter):.2f} | "
+                f"{max(chatter):.1f} | {max(row.peak_speed for row in some):.2f} | {max(peak):.2f} | "
+                f"{sum(one > 1.0 + 1e-6 for one in peak)} | {np.mean([row.task_error for row in some]):.4f} | "
+                f"{max(row.fixed_error for row in some):.0e} | {sum(row.failed for row in some)} |"
+            )
+    return "\n".join(lines)
+
+
 def to_markdown(rows: Sequence[SingularRow]) -> str:
     """Write rows as a Markdown table."""
     head = (
@@ -261,6 +284,9 @@ def main() -> None:
     for title, arguments in tables.items():
         rows = singular_sweep(*arguments)
         console.print(f"## {title}\n\n{to_markdown(rows)}\n", markup=False, highlight=False)
+    arms = [name.partition("@")[::2] for name in sys.argv[1:] or (ROBOT, "ur5e")]
+    table = random_sweep([load_robot(name, tip=tip or None) for name, tip in arms], robust)
+    console.print(f"## Random paths\n\n{table}\n", markup=False, highlight=False)
     console.print("; ".join(f"{k} {v}" for k, v in conditions().items()) + ".", markup=False, highlight=False)
 
 

@@ -1,56 +1,94 @@
-"""Where a sweep lives on disk: a manifest and one Parquet file per cell, each written whole or not at all."""
+"""What a sweep leaves behind: a folder with a manifest and, for each cell, its ticks, its times and how it ended."""
 
 from __future__ import annotations
 
+import io
 import json
-import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+import os
+import tempfile
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-import numpy as np
 import polars as pl
 
-from .config import SweepConfig
+from .cells import Cell
+from .config import SweepConfig, cells_of, skipped_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from .cells import Block
 
-    from numpy.typing import NDArray
-
-    from ..control import Trajectory
-
-    Array = NDArray[np.float64]
-
-_FORMAT: Final = 1
-_TIMES: Final = ("setup_time", "solve_time")
+_FORMAT: Final = 2
+_FOLDERS: Final = ("ticks", "times", "cells", "problems")
+# Between a sweep and its continuation these may differ.
+_MAY_CHANGE: Final = frozenset({"date"})
 
 
-class StoreError(ValueError):
+class StoreError(RuntimeError):
     """A results folder can't be used as asked; the message says what to do."""
 
 
-@dataclass(frozen=True, order=True)
-class Cell:
-    """One scenario x formulation x solver."""
+@dataclass(frozen=True)
+class Part:
+    """How a part of a cell ended.
 
-    scenario: str
-    formulation: str
-    solver: str
+    Attributes
+    ----------
+    state : {"done", "failed"}
+    reason : str
+        Why it failed; empty where it did not.
+    loop : {"closed", "states", "sampled", "replay"}
+        Accuracy: the solver's own closed loop, the scenario's states, or some of the reference's. Timing: "replay".
+    ticks, repeats : int
+        Sample sizes.
+    deterministic : bool
+        Timing: whether every repeat gave the same answers, bit for bit.
+    notes : tuple of str
+        What else a reader must know, such as why a column is empty.
+    """
 
-    def __str__(self) -> str:
-        """Write it for people."""
-        return f"{self.scenario} / {self.formulation} / {self.solver}"
+    state: Literal["done", "failed"]
+    reason: str = ""
+    loop: str = ""
+    ticks: int = 0
+    repeats: int = 0
+    deterministic: bool = True
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a cell ended; a part that is None has not been run."""
+
+    accuracy: Part | None = None
+    timing: Part | None = None
 
     @property
-    def file_name(self) -> str:
-        """Name of its Parquet file: readable, and different for different cells."""
-        parts = (self.scenario, self.formulation, self.solver)
-        return "__".join(re.sub(r"[^\w=.,+-]", "_", part) for part in parts) + ".parquet"
+    def failed(self) -> str:
+        """Why the cell failed; empty where it did not."""
+        return next((part.reason for part in (self.accuracy, self.timing) if part and part.state == "failed"), "")
 
 
-def cells_of(config: SweepConfig) -> tuple[Cell, ...]:
-    """All cells of a sweep, in the order of its lists."""
-    return tuple(Cell(a, b, c) for a in config.scenarios for b in config.formulations for c in config.solvers)
+@dataclass(frozen=True)
+class Manifest:
+    """What was asked for, and under which conditions it was measured.
+
+    Attributes
+    ----------
+    config : SweepConfig
+    conditions : dict of str to str
+        Machine, versions, git revision, date.
+    cells : tuple of Cell
+        All that the sweep consists of, done or not.
+    skipped : dict of str to str
+        What the configuration names and is not a cell, and why.
+    """
+
+    config: SweepConfig
+    conditions: dict[str, str]
+    cells: tuple[Cell, ...]
+    skipped: dict[str, str] = field(default_factory=dict)
 
 
 class Store:
@@ -60,14 +98,16 @@ class Store:
     ----------
     folder : Path
         Made when a sweep is begun in it.
+
+    Attributes
+    ----------
+    unwritten : dict of str to str
+        What the last sweep could not write, and why; a continuation tries again.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder: Final = folder
-
-    @property
-    def _manifest(self) -> Path:
-        return self.folder / "manifest.json"
+    def __init__(self, folder: str | Path) -> None:
+        self.folder: Final = Path(folder)
+        self.unwritten: Final[dict[str, str]] = {}
 
     def begin(self, config: SweepConfig, conditions: dict[str, str], *, resume: bool, overwrite: bool) -> None:
         """Prepare the folder for a sweep.
@@ -80,33 +120,47 @@ class Store:
         """
         if resume and overwrite:
             raise StoreError(f"{self.folder}: expected either --resume or --overwrite, got both")
-        if self._manifest.exists() and not overwrite:
+        if self._path.exists() and not overwrite:
             self._check_resumable(config, conditions, resume=resume)
-            return
-        (self.folder / "cells").mkdir(parents=True, exist_ok=True)
-        for old in (self.folder / "cells").glob("*.parquet"):
-            old.unlink()
-        manifest = {"format": _FORMAT, "config": config.model_dump(mode="json"), "conditions": conditions}
-        _write_whole(self._manifest, (json.dumps(manifest, indent=2) + "\n").encode())
+        else:
+            # The manifest goes first and comes last: a folder with one has nothing of another sweep in it.
+            self._path.unlink(missing_ok=True)
+            for name in _FOLDERS:
+                (self.folder / name).mkdir(parents=True, exist_ok=True)
+                for old in (self.folder / name).iterdir():
+                    old.unlink()
+            content = {
+                "format": _FORMAT,
+                "config": config.model_dump(mode="json"),
+                "conditions": conditions,
+                "cells": [asdict(cell) for cell in cells_of(config)],
+                "skipped": skipped_of(config),
+            }
+            write_whole(self._path, (json.dumps(content, indent=1) + "\n").encode())
+        for name in _FOLDERS:
+            (self.folder / name).mkdir(exist_ok=True)
+            for partial in (self.folder / name).glob("*.partial"):
+                partial.unlink()
+        self.__dict__.pop("manifest", None)
 
     def _check_resumable(self, config: SweepConfig, conditions: dict[str, str], *, resume: bool) -> None:
-        stored, stored_conditions = self.manifest()
         if not resume:
             raise StoreError(
                 f"{self.folder} holds a sweep already: give --resume to continue it, --overwrite to replace it, "
                 "or another folder with --out"
             )
-        if stored != config:
+        if self.manifest.config.model_dump(mode="json") != config.model_dump(mode="json"):
             raise StoreError(f"{self.folder} holds a sweep with another configuration: expected the same to resume it")
-        for key, value in stored_conditions.items():
-            if key != "date" and conditions.get(key) != value:
+        for key, value in self.manifest.conditions.items():
+            if key not in _MAY_CHANGE and conditions.get(key) != value:
                 raise StoreError(
                     f"{self.folder} was measured with {key} {value!r} and this is {conditions.get(key)!r}: "
                     "times of the two don't belong into one table; give another folder with --out"
                 )
 
-    def manifest(self) -> tuple[SweepConfig, dict[str, str]]:
-        """Configuration and conditions of the sweep in the folder.
+    @cached_property
+    def manifest(self) -> Manifest:
+        """What was asked for, and how it was measured.
 
         Raises
         ------
@@ -114,82 +168,98 @@ class Store:
             When there is none, or it can't be read.
         """
         try:
-            manifest: dict[str, Any] = json.loads(self._manifest.read_text(encoding="utf-8"))
+            read: dict[str, Any] = json.loads(self._path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
             raise StoreError(f"{self.folder}: expected a sweep's manifest.json there: {error}") from error
-        if manifest.get("format") != _FORMAT:
-            raise StoreError(f"{self._manifest}: expected format {_FORMAT}, got {manifest.get('format')!r}")
-        return SweepConfig.model_validate(manifest["config"]), dict(manifest["conditions"])
+        if read.get("format") != _FORMAT:
+            raise StoreError(f"{self._path}: expected format {_FORMAT}, got {read.get('format')!r}")
+        # Checked when it was written. Here it need not name what is installed: results are read elsewhere, too.
+        config = SweepConfig.model_construct(**_tuples(read["config"]))
+        cells = tuple(Cell(**cell) for cell in read["cells"])
+        return Manifest(config, dict(read["conditions"]), cells, dict(read["skipped"]))
 
-    def repeats_done(self, cell: Cell) -> int:
-        """How many timed runs of a cell the folder holds."""
-        path = self._path(cell)
-        if not path.exists():
-            return 0
-        width = pl.read_parquet_schema(path)["solve_time"]
-        return int(width.size) if isinstance(width, pl.Array) else 0
+    def cells(self) -> tuple[Cell, ...]:
+        """Cells whose ticks are there, in the manifest's order."""
+        return tuple(cell for cell in self.manifest.cells if self._file("ticks", cell).exists())
 
-    def add(self, cell: Cell, run: Trajectory) -> None:
-        """Add a timed run to a cell.
+    def failed(self) -> dict[Cell, str]:
+        """Cells that failed, in either part, and why."""
+        reasons = {cell: self.outcome(cell).failed for cell in self.manifest.cells}
+        return {cell: reason for cell, reason in reasons.items() if reason}
 
-        Raises
-        ------
-        StoreError
-            When its commands differ from those of the runs before: the controller isn't deterministic, and times of
-            different problems would be mixed.
-        """
-        frame = to_frame(run)
-        path = self._path(cell)
-        if path.exists():
-            before = pl.read_parquet(path)
-            if not np.array_equal(before["qd"].to_numpy(), frame["qd"].to_numpy()):
-                raise StoreError(f"{cell}: expected the same commands in every run, got different ones")
-            frame = before.with_columns(
-                pl.Series(name, np.hstack([before[name].to_numpy(), frame[name].to_numpy()])).cast(
-                    pl.Array(pl.Float64, before[name].to_numpy().shape[1] + 1)
-                )
-                for name in _TIMES
-            )
-        temporary = path.with_suffix(".partial")
-        frame.write_parquet(temporary, compression="zstd")
-        temporary.replace(path)
+    def outcome(self, cell: Cell) -> Outcome:
+        """How a cell ended, as far as it has been run."""
+        try:
+            read = json.loads((self.folder / "cells" / f"{cell.file_stem}.json").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return Outcome()
+        parts = {name: None if part is None else Part(**_tuples(part)) for name, part in read.items()}
+        return Outcome(**parts)
 
-    def read(self, cell: Cell) -> pl.DataFrame:
-        """Ticks of a cell, one per row; see `to_frame`."""
-        return pl.read_parquet(self._path(cell))
+    def ticks(self, cell: Cell) -> pl.DataFrame:
+        """Ticks of a cell's accuracy part, one per row; the columns are those of `kinqp.benchmarks.accuracy`."""
+        return pl.read_parquet(self._file("ticks", cell))
 
-    def _path(self, cell: Cell) -> Path:
-        return self.folder / "cells" / cell.file_name
+    def times(self, cell: Cell) -> pl.DataFrame | None:
+        """Times of a cell, one tick of one repeat per row, as `kinqp.benchmarks.replay` has them; None: not timed."""
+        path = self._file("times", cell)
+        return pl.read_parquet(path) if path.exists() else None
 
+    def add_accuracy(self, cell: Cell, ticks: bytes | None, part: Part) -> None:
+        """Keep the accuracy part of a cell: its ticks as a Parquet file, none where it failed."""
+        if ticks is not None:
+            write_whole(self._file("ticks", cell), ticks)
+        self._end(cell, Outcome(part, self.outcome(cell).timing))
 
-def to_frame(run: Trajectory) -> pl.DataFrame:
-    """One row per tick.
+    def add_timing(self, cell: Cell, times: bytes | None, part: Part) -> None:
+        """Keep the timing part of a cell."""
+        if times is not None:
+            write_whole(self._file("times", cell), times)
+        self._end(cell, Outcome(self.outcome(cell).accuracy, part))
 
-    Columns: `t` [s]; `q`, `qd` [rad or m, .../s], `v`, `eps` [m/s, rad/s], `position` [m] as arrays; `fixed_error`,
-    `bound_violation`, `sigma_min`, `iterations`, `status`, `message`, `active` (names of rows); `setup_time` and
-    `solve_time` [s] as arrays with one entry per timed run.
-    """
-    columns: dict[str, pl.Series] = {
-        "t": pl.Series(run.t),
-        "status": pl.Series([status.value for status in run.status]),
-        "message": pl.Series(list(run.message)),
-        "active": pl.Series([list(names) for names in run.active], dtype=pl.List(pl.String)),
-        "iterations": pl.Series(run.iterations),
-    }
-    for name in ("fixed_error", "bound_violation", "sigma_min"):
-        columns[name] = pl.Series(getattr(run, name))
-    for name in ("q", "qd", "v", "eps", "position"):
-        columns[name] = _array_series(getattr(run, name))
-    for name in _TIMES:
-        columns[name] = _array_series(getattr(run, name)[:, None])
-    return pl.DataFrame(columns)
+    def _end(self, cell: Cell, outcome: Outcome) -> None:
+        content = json.dumps(asdict(outcome), indent=1) + "\n"
+        write_whole(self.folder / "cells" / f"{cell.file_stem}.json", content.encode())
+
+    def problems(self, block: Block) -> Path:
+        """Where a block's recorded problems are kept."""
+        return self.folder / "problems" / f"{block.file_stem}.npz"
+
+    @property
+    def _path(self) -> Path:
+        return self.folder / "manifest.json"
+
+    def _file(self, folder: str, cell: Cell) -> Path:
+        return self.folder / folder / f"{cell.file_stem}.parquet"
 
 
-def _array_series(values: Array) -> pl.Series:
-    return pl.Series(np.ascontiguousarray(values), dtype=pl.Array(pl.Float64, values.shape[1]))
+def parquet(frame: pl.DataFrame) -> bytes:
+    """Return a frame as a Parquet file."""
+    buffer = io.BytesIO()
+    frame.write_parquet(buffer, compression="zstd")
+    return buffer.getvalue()
 
 
-def _write_whole(path: Path, content: bytes) -> None:
-    temporary = path.with_suffix(".partial")
-    temporary.write_bytes(content)
-    temporary.replace(path)
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all, whatever happens meanwhile: beside its place, to the disk, into its place."""
+    handle, name = tempfile.mkstemp(prefix=path.name[:100], suffix=".partial", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).chmod(0o644)
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def _tuples(read: dict[str, Any]) -> dict[str, Any]:
+    """Turn JSON's lists back into tuples, and further products into what they were."""
+    from .config import Product
+
+    made: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in read.items()}
+    if "more" in made:
+        made["more"] = tuple(Product.model_construct(**_tuples(product)) for product in made["more"])
+    return made

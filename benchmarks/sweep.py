@@ -1,24 +1,28 @@
-"""The sweep: every cell run in closed loop, timed runs in random interleaved order."""
+"""The sweep: accuracy of all cells, in parallel; then their times, block by block, with nothing else running."""
 
 from __future__ import annotations
 
-import gc
-from contextlib import contextmanager
-from pathlib import Path
+import os
+from contextlib import closing
+from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..control import make_step, simulate
-from .conditions import conditions
-from .config import SweepConfig, make_config
-from .scenarios import Scenario, get_scenario
-from .store import Cell, Store, cells_of
+from .cluster import on_a_cluster
+from .conditions import conditions, timing_core
+from .config import SweepConfig
+from .loading import make_config
+from .messages import Ran
+from .processes import Worker
+from .schedule import Recorded, Task, on_this_machine
+from .store import Part, Store, write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+    from pathlib import Path
 
-    from ..control import InterpretedStep, Trajectory
+    from .cells import Block, Cell
+
+    Progress = Callable[[int, int, str], None]
 
 
 def sweep(
@@ -27,13 +31,17 @@ def sweep(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    on_progress: Callable[[int, int, str], None] | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    on_progress: Progress | None = None,
 ) -> Store:
     """Run a sweep.
 
-    Every repeat visits all cells in a new random order, so that a machine that slows down or speeds up does so for all
-    of them; each visit runs the scenario's whole closed loop with a new solver, after a warm-up whose ticks are thrown
-    away. A cell's file is replaced after each of its runs: interrupted, the folder keeps all runs done.
+    First the accuracy part of every cell, its closed loop, in worker processes. Then the timing part, block by block,
+    in one process on one core, with nothing else of the sweep running. A cell whose solver crashes, hangs or runs out
+    of memory or disk has failed, and the store says why; the others go on. Each file is written whole or not at all
+    as soon as there is something to write: interrupted in any way, the folder keeps all but the cells being run, or
+    the times of the block being timed. What could not be written is in the store's `unwritten`.
 
     Parameters
     ----------
@@ -42,11 +50,15 @@ def sweep(
     out : str or Path
         Results folder.
     resume : bool
-        Continue the sweep in `out`, where there is one.
+        Continue the sweep in `out`, where there is one. Cells that failed stay so.
     overwrite : bool
         Replace it.
+    workers : int, optional
+        Processes for the accuracy part; one for each core without it. The results are the same for any number.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers do the accuracy part instead, with the same results.
     on_progress : callable, optional
-        Called with (runs done, runs in all, the cell to run next or "").
+        Called with (parts done, parts in all, what is being done or was done last); every cell has two parts.
 
     Returns
     -------
@@ -59,59 +71,111 @@ def sweep(
         Naming the key of `config` that is not usable.
     StoreError
         When `out` can't be used as asked.
+    ClusterError
+        When the scheduler can't be used.
     """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers: expected at least 1, got {workers}")
     if not isinstance(config, SweepConfig):
         config = make_config(dict(config or {}))
-    store = Store(Path(out))
+    store = Store(out)
     store.begin(config, conditions(), resume=resume, overwrite=overwrite)
-    pending = list(_schedule(config, {cell: store.repeats_done(cell) for cell in cells_of(config)}))
-    total = len(cells_of(config)) * config.repeats
-    scenarios = {name: get_scenario(name) for name in config.scenarios}
-    steps: dict[Cell, InterpretedStep] = {}
-    for done, cell in enumerate(pending, start=total - len(pending)):
-        if on_progress is not None:
-            on_progress(done, total, str(cell))
-        scenario = scenarios[cell.scenario]
-        if cell not in steps:
-            steps[cell] = make_step(scenario.robot, cell.formulation, scenario.mode, cell.solver)
-        store.add(cell, timed_run(steps[cell], scenario, config.warm_up))
-    if on_progress is not None:
-        on_progress(total, total, "")
-    return store
+    return _Sweep(store, config, on_progress).run(workers or _cores(), scheduler)
 
 
-def timed_run(step: InterpretedStep, scenario: Scenario, warm_up: int) -> Trajectory:
-    """Run a scenario's closed loop once, after `warm_up` ticks that don't count.
+class _Sweep:
+    def __init__(self, store: Store, config: SweepConfig, on_progress: Progress | None) -> None:
+        self._store = store
+        self._config = config
+        self._report = on_progress
+        cells = store.manifest.cells
+        self._outcomes = {cell: store.outcome(cell) for cell in cells}
+        self._total = 2 * len(cells)
+        self._done = sum(
+            (outcome.accuracy is not None) + (outcome.timing is not None) for outcome in self._outcomes.values()
+        )
 
-    The solver forgets its set-up between the two: the first tick's `setup_time` is that of a full set-up, all others
-    are updates.
-    """
-    if warm_up:
-        ticks = max(2, min(warm_up, round(scenario.duration / scenario.dt)))
-        simulate(step, scenario.guide, scenario.q0, ticks * scenario.dt, dt=scenario.dt)
-    step.solver.reset()
-    with _no_garbage_collection():
-        return simulate(step, scenario.guide, scenario.q0, scenario.duration, dt=scenario.dt)
+    def run(self, workers: int, scheduler: str | None) -> Store:
+        self._progress("")
+        tasks = self._accuracy_tasks()
+        if tasks:
+            results = (
+                on_a_cluster(tasks, self._config, scheduler)
+                if scheduler
+                else on_this_machine(tasks, self._config, workers)
+            )
+            self._take(results)
+        self._time_all()
+        return self._store
+
+    def _accuracy_tasks(self) -> list[Task]:
+        blocks: dict[Block, list[Cell]] = {}
+        for cell in self._outcomes:
+            blocks.setdefault(cell.block, []).append(cell)
+        tasks: list[Task] = []
+        for block, cells in blocks.items():
+            untimed = any(self._outcomes[cell].timing is None for cell in cells)
+            if untimed and not self._store.problems(block).exists():
+                tasks.append(Task(block))
+            tasks += [Task(block, cell) for cell in cells if self._outcomes[cell].accuracy is None]
+        return tasks
+
+    def _take(self, results: Iterator[Ran | Recorded]) -> None:
+        # Closed here and now, also when something is raised: its processes must be gone before anything is timed.
+        with closing(results) as open_results:  # type: ignore[type-var]  # generators, of which only iteration is named
+            for result in open_results:
+                if isinstance(result, Recorded):
+                    if isinstance(result.problems, bytes):
+                        path = self._store.problems(result.block)
+                        self._write(str(result.block), partial(write_whole, path, result.problems))
+                    continue
+                self._write(str(result.cell), partial(self._store.add_accuracy, result.cell, result.frame, result.part))
+                self._done += 1
+                self._progress(str(result.cell))
+
+    def _time_all(self) -> None:
+        blocks: dict[Block, list[Cell]] = {}
+        for cell in self._outcomes:
+            outcome = self._store.outcome(cell)
+            if outcome.timing is not None:
+                continue
+            if outcome.accuracy is not None and outcome.accuracy.state == "done":
+                blocks.setdefault(cell.block, []).append(cell)
+            elif outcome.accuracy is not None:
+                self._end(Ran(cell, None, Part("failed", "its accuracy part failed")))
+        worker = Worker()
+        try:
+            for block, cells in blocks.items():
+                path = self._store.problems(block)
+                if not path.exists():
+                    for cell in cells:
+                        self._end(Ran(cell, None, Part("failed", "the block has no recorded problems")))
+                    continue
+                for answer in worker.time(path.read_bytes(), tuple(cells), self._config, timing_core()):
+                    if isinstance(answer, Ran):
+                        self._end(answer)
+                    else:
+                        self._progress(f"timing {answer.cell}")
+        finally:
+            worker.close()
+            worker.stop()
+
+    def _end(self, ran: Ran) -> None:
+        self._write(f"times of {ran.cell}", partial(self._store.add_timing, ran.cell, ran.frame, ran.part))
+        self._done += 1
+        self._progress(f"timed {ran.cell}")
+
+    def _write(self, what: str, write: Callable[[], None]) -> None:
+        """Write something down; where that fails, as on a full disk, it is the end of this and not of all."""
+        try:
+            write()
+        except OSError as error:
+            self._store.unwritten[what] = str(error)
+
+    def _progress(self, what: str) -> None:
+        if self._report is not None:
+            self._report(self._done, self._total, what)
 
 
-def _schedule(config: SweepConfig, done: dict[Cell, int]) -> Iterator[Cell]:
-    """Cells in the order they are to be run: repeat by repeat, shuffled within each; runs done before left out."""
-    rng = np.random.default_rng(config.seed)
-    cells = list(done)
-    for repeat in range(config.repeats):
-        for index in rng.permutation(len(cells)):
-            if done[cells[index]] <= repeat:
-                yield cells[index]
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Keep the interpreter's garbage collector out of the timed span; it would strike single ticks at random."""
-    was_enabled = gc.isenabled()
-    gc.collect()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_enabled:
-            gc.enable()
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

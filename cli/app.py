@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from ..baselines import available_baselines, get_baseline
 from ..benchmarks import (
     TABLE_WIDTH,
+    ClusterError,
+    CompareError,
     ConfigError,
+    ReportError,
     Store,
     StoreError,
     available_scenarios,
@@ -28,10 +32,17 @@ from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
+from .davinci import run_davinci
 from .interrupt import interruptible
+from .report import run_compare, run_report
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
+    ClusterError,
+    CompareError,
     CompilerError,
     ConfigError,
     CurvatureError,
@@ -41,6 +52,7 @@ USER_ERRORS = (
     OptionError,
     PlotError,
     PluginError,
+    ReportError,
     RobotError,
     StoreError,
     UnknownOptionError,
@@ -56,9 +68,14 @@ app = typer.Typer(
 )
 
 
+app.command("report")(run_report)
+app.command("compare")(run_compare)
+app.command("davinci")(run_davinci)
+
+
 @app.command("list")
 def list_all() -> None:
-    """List robots, modes, formulations, solvers and scenarios."""
+    """List robots, modes, formulations, baselines, solvers and scenarios."""
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold", no_wrap=True)
     table.add_column(no_wrap=True)
@@ -68,6 +85,7 @@ def list_all() -> None:
         "robots": dict.fromkeys(available_robots(), ""),
         "modes": dict.fromkeys(MODE_NAMES, ""),
         "formulations": described,
+        "baselines": {name: _described(name, get_baseline) for name in available_baselines()},
         "solvers": dict.fromkeys(available_solvers(), ""),
         "scenarios": {name: get_scenario(name).description for name in available_scenarios()},
     }
@@ -81,10 +99,16 @@ def list_all() -> None:
 def run_sweep(
     config: Annotated[Path | None, typer.Argument(help="TOML file; without it, the shipped default.")] = None,
     out: Annotated[Path, typer.Option(help="Results folder.")] = Path("results"),
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes for the accuracy part; all cores without it.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Dask scheduler that does the accuracy part, as tcp://host:8786.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the sweep in the results folder.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the sweep in the results folder.")] = False,
 ) -> None:
-    """Run formulations x solvers x scenarios in closed loop and print the table."""
+    """Run formulations x solvers x scenarios: accuracy in parallel, then times alone; print the table."""
     console = _console()
     store = Store(out)
     progress = Progress(
@@ -105,15 +129,23 @@ def run_sweep(
                 interrupted()
                 progress.update(bar, completed=done, total=total, description=cell)
 
-            sweep(loaded, out, resume=resume, overwrite=overwrite, on_progress=on_progress)
+            store = sweep(
+                loaded, out, resume=resume, overwrite=overwrite, workers=workers, scheduler=scheduler,
+                on_progress=on_progress,
+            )  # fmt: skip
     except KeyboardInterrupt:
-        if any((out / "cells").glob("*.parquet")):
+        if any((out / "ticks").glob("*.parquet")):
             console.print(sweep_table(store))
         again = " ".join(["kinqp sweep", *([str(config)] if config else []), "--out", str(out), "--resume"])
-        console.print(f"Interrupted; {out} keeps all runs done. Next: {again}")
+        console.print(f"Interrupted; {out} keeps all cells done. Next: {again}")
         raise typer.Exit(130) from None
     console.print(sweep_table(store))
-    console.print(f"Wrote manifest.json and one Parquet file per cell to {out}. Next: read them with polars.")
+    console.print(f"Wrote manifest.json, ticks and times of every cell to {out}. Next: kinqp report {out}")
+    if store.unwritten:
+        what, why = next(iter(store.unwritten.items()))
+        console.print(f"{len(store.unwritten)} results could not be written, as {what}: {why}.")
+        console.print("Next: make room, then the same command with --resume.")
+        raise typer.Exit(1)
 
 
 @app.command("export")
@@ -150,10 +182,10 @@ def run_describe(
         Console(stderr=True, soft_wrap=True).print(f"Wrote {written}. Next: kinqp export, to have it as C.")
 
 
-def _described(formulation: str) -> str:
+def _described(name: str, get: Callable[[str], object] = get_formulation) -> str:
     """First line of a formulation's docstring; what is wrong with it, where another package's can't be loaded."""
     try:
-        return (type(get_formulation(formulation)).__doc__ or "").partition("\n")[0]
+        return (type(get(name)).__doc__ or "").partition("\n")[0]
     except PluginError as error:
         return str(error)
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from copy import copy
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
+from ..baselines import Baseline, BaselineStep, Tolerances, get_baseline, is_baseline
 from ..formulations import ABOVE, Evaluator, InputError, Mode, StepResult, get_formulation, levels_of, lower
-from ..solvers import Status, get_solver
+from ..solvers import PluginError, Status, get_solver
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -37,6 +39,11 @@ class InterpretedStep:
     command is the safe stop too.
 
     Not to be shared between threads.
+
+    Attributes
+    ----------
+    solved : tuple of (Instance, Solution)
+        What was solved in the last call, level by level: the evidence behind its result.
     """
 
     def __init__(self, robot: Robot, formulation: Formulation, mode: Mode, solver: Solver) -> None:
@@ -49,6 +56,14 @@ class InterpretedStep:
         # Between the levels of a hierarchy this one is handed on, not given.
         passed_on = ABOVE if len(self._levels) > 1 else None
         self._inputs: Final = tuple(dict.fromkeys(name for name in names if name != passed_on))
+        self.solved: tuple[tuple[Instance, Solution], ...] = ()
+
+    def with_solver(self, solver: Solver) -> InterpretedStep:
+        """Give the same step with another solver, without lowering its formulation again; not for another thread."""
+        made = copy(self)
+        # Not an attribute that changes: the copy is new, and this is where it is made.
+        made.__dict__.update(solver=solver, solved=())
+        return made
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -87,6 +102,7 @@ class InterpretedStep:
             if solution.status is not Status.SOLVED or not np.isfinite(_command(instance, solution)).all():
                 break
             active |= dict.fromkeys(level.active_rows(instance.qp, solution))
+        self.solved = tuple(solved)
         return self._judge(solved, tuple(active))
 
     def batch(self, Q: ArrayLike, V: ArrayLike, **inputs: ArrayLike) -> list[StepResult]:
@@ -162,32 +178,60 @@ def _smallest_singular_value(matrix: Array) -> float:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
+@overload
 def make_step(
-    robot: Robot, formulation: str | Formulation, mode: str | Mode, solver: str | Solver = "active-set", **options: Any
-) -> InterpretedStep:
-    """Make the control cycle of a formulation on a robot in a mode, solved by any solver.
+    robot: Robot, formulation: Formulation, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> InterpretedStep: ...
+
+
+@overload
+def make_step(
+    robot: Robot, formulation: Baseline, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> BaselineStep: ...
+
+
+@overload
+def make_step(
+    robot: Robot, formulation: str, mode: str | Mode, solver: str | Solver = ..., **options: Any
+) -> InterpretedStep | BaselineStep: ...
+
+
+def make_step(
+    robot: Robot,
+    formulation: str | Formulation | Baseline,
+    mode: str | Mode,
+    solver: str | Solver = "active-set",
+    **options: Any,
+) -> InterpretedStep | BaselineStep:
+    """Make the control cycle of a formulation on a robot in a mode, solved by any solver; or that of a baseline.
 
     Parameters
     ----------
     robot : Robot
         From `load_robot`.
-    formulation : str or Formulation
+    formulation : str, Formulation or Baseline
         A registered name, `module:Name`, or an instance; options in brackets, as in "cartesian-error(bounds=thesis)".
     mode : str or Mode
         As in `Mode.parse`, or an instance.
     solver : str or Solver
-        A registered name, `module:Name`, or an instance.
+        A registered name, `module:Name`, or an instance. A baseline has none, whatever is given.
     **options
         Handed to the solver, where it is given by name.
 
     Returns
     -------
-    InterpretedStep
+    InterpretedStep or BaselineStep
         Call it with (q, v).
+
+    Raises
+    ------
+    PluginError
+        When one of the names is not known, or options come with a baseline.
     """
-    return InterpretedStep(
-        robot,
-        get_formulation(formulation),
-        Mode.parse(mode) if isinstance(mode, str) else mode,
-        get_solver(solver, **options),
-    )
+    parsed = Mode.parse(mode) if isinstance(mode, str) else mode
+    if isinstance(formulation, Baseline) or (isinstance(formulation, str) and is_baseline(formulation)):
+        if options:
+            raise PluginError(f"baseline {formulation}: expected no options of a solver, got {', '.join(options)}")
+        tolerances = Tolerances(bound=BOUND_TOLERANCE, fixed=FIXED_TOLERANCE, fixed_floor=FIXED_FLOOR)
+        return BaselineStep(robot, get_baseline(formulation), parsed, tolerances)
+    return InterpretedStep(robot, get_formulation(formulation), parsed, get_solver(solver, **options))

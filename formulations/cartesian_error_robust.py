@@ -9,7 +9,7 @@ import casadi as ca
 
 from .algebra import matmul
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window
+from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -47,7 +47,8 @@ class CartesianErrorRobust(Formulation):
     -------------------
     task_weight : shape (m_free,)
         W's diagonal, 1 unless told otherwise.
-    damping_threshold, damping_max, pull_gain, smoothing_time, excess_price, governor_share
+    damping_threshold, damping_max, pull_gain, smoothing_time, smoothing_stretch, excess_price,
+    governor_share
         As in `JointSpaceRobust`.
     """
 
@@ -63,17 +64,19 @@ class CartesianErrorRobust(Formulation):
 
         measured = damping(tick)
         inverse = matmul(tick.J_bar.T, measured.inverse)
-        v = tick.v * governor(tick, measured) - matmul(tick.J_free, tick.qd_fixed)
+        share, need = governor(tick, measured)
+        v = tick.v * share - matmul(tick.J_free, tick.qd_fixed)
+        tau = smoothing_time(tick, need)
         away = pull(tick, measured)
         wanted = away + matmul(inverse, v - matmul(tick.J_free, away))
-        keep = kept_share(tick)
+        keep = kept_share(tick, tau)
         last = tick.fixed.project(tick.qd_prev.T).T if tick.m_fixed else tick.qd_prev
         calm = keep * last + (1 - keep) * wanted
         speed = matmul(tick.J_free, calm)
         rest = calm - matmul(inverse, speed)
         qd = tick.qd_fixed + matmul(inverse, speed + eps) + outside * rest
 
-        window = rate_window(tick, gentle=True)
+        window = rate_window(tick, tau)
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")
         limit_rate(qp, tick, qd, window)
         qp.command(qd)

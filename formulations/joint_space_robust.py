@@ -9,7 +9,7 @@ import casadi as ca
 
 from ..solvers.options import flag
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, scaled_last_command
+from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, scaled_last_command, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -43,11 +43,12 @@ class JointSpaceRobust(Formulation):
     - **Rate limit**: accelerations stay within `qdd_max`. Where the locked rows or the limits of position and velocity
       don't allow that, it yields, by the variable `excess` (`limit_rate`); those never do.
     - **Smoothing**: the error of the last command, :math:`\varepsilon_{prev} = J_{free}\,\dot q_{prev} - v`, decays
-      with the time constant `smoothing_time` instead of at once, :math:`\varphi = \tau/(\tau + dt)`. The
+      with a time constant instead of at once, :math:`\varphi = \tau/(\tau + dt)`, the longer the more acceleration
+      the hand's speed needs (`smoothing_time`). The
       acceleration is then as continuous as the QP's data, with no memory but `qd_prev`; joints approach their limits
       in the same way.
-    - **Governor**: near singularities of the locked rows the hand's speed is reduced such that these leave the joints
-      enough acceleration (`governor`): v stands for its governed share throughout.
+    - **Governor**: near singularities the hand's speed is reduced such that its rows, and the locked ones above all,
+      leave the joints enough acceleration (`governor`): v stands for its governed share throughout.
 
     Zero motion, with :math:`\dot q` that of the drift correction, is feasible at every state within the limits. Each of
     the five can be left out; without all of them this is `joint-space`. docs/singularities.md compares them.
@@ -64,15 +65,15 @@ class JointSpaceRobust(Formulation):
     joint_weight : shape (nv,)
         W_q's diagonal, `ROBUST_JOINT_WEIGHT` unless told otherwise.
     damping_threshold, damping_max
-        sigma_0 and lambda_max [m or rad], 0.1 and 0.08.
+        sigma_0 and lambda_max [m or rad], 0.2 and 0.12.
     pull_gain
-        Speed of the pull over the hand's speed [1/m], 1.
-    smoothing_time
-        tau [s], 0.02.
+        Speed of the pull over the hand's speed [1/m], 2.
+    smoothing_time, smoothing_stretch
+        tau at rest, and what the need of all of `qdd_max` adds to it (with the governor only) [s], 0.02 and 0.05.
     excess_price
         p [m^2/s^2], 1.
     governor_share
-        Largest share of `qdd_max` that the locked rows may take up [-], 0.5.
+        Largest share of `qdd_max` that the locked rows may take up [-], 0.3.
     """
 
     damping: bool = True
@@ -98,8 +99,12 @@ class JointSpaceRobust(Formulation):
         task_weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
         weight = tick.parameter("joint_weight", ROBUST_JOINT_WEIGHT, size=tick.nv, lowest=0.0, positive=True)
         measured = damping(tick) if self.damping or self.governor else None
-        v = tick.v * governor(tick, measured) if self.governor and measured else tick.v
-        keep = kept_share(tick) if self.smoothing else ca.SX(0)
+        v, need = tick.v, ca.SX(0)
+        if self.governor and measured:
+            share, need = governor(tick, measured)
+            v = tick.v * share
+        tau = smoothing_time(tick, need) if self.smoothing else None
+        keep = kept_share(tick, tau) if tau is not None else ca.SX(0)
         # Both before the error and before the velocity: what the term would be zero at.
         slowed, wish = v - tick.v, ca.SX(tick.nv, 1)
         if self.damping and measured:
@@ -117,7 +122,7 @@ class JointSpaceRobust(Formulation):
         qp.command(qd)
         start = {"qd": tick.qd_fixed}
         if self.rate_limit:
-            window = rate_window(tick, gentle=self.smoothing)
+            window = rate_window(tick, tau)
             limit_rate(qp, tick, qd, window)
             start["qd"] = tick.qd_fixed + scaled_last_command(tick)
             start[EXCESS] = needed_excess(window, start["qd"])

@@ -39,28 +39,44 @@ class RateWindow:
     step: ca.SX
 
 
-def kept_share(tick: Tick) -> ca.SX:
-    """Share of the last command's error that is left after one period, tau / (tau + dt); parameter `smoothing_time`."""
+def smoothing_time(tick: Tick, needed: ca.SX) -> ca.SX:
+    r"""Time constant of the smoothing, scalar [s]: the longer, the more of `qdd_max` the rows need.
+
+    Smoothed, a joint's acceleration passes zero with the slope of the wanted acceleration over the time constant. A
+    slope that stays below 2 % of `qdd_max` per millisecond takes 50 ms where all of `qdd_max` is wanted, and none in
+    addition to `smoothing_time` where the arm moves gently.
+
+    Parameters
+    ----------
+    tick : Tick
+        With the parameters `smoothing_time` and `smoothing_stretch`.
+    needed : ca.SX, scalar
+        As a share of `qdd_max`; see `governor`.
+    """
     tau = tick.parameter("smoothing_time", 0.02, lowest=0.0, unit="s")
+    return tau + tick.parameter("smoothing_stretch", 0.05, lowest=0.0, unit="s") * needed
+
+
+def kept_share(tick: Tick, tau: ca.SX) -> ca.SX:
+    """Share of the last command's error that is left after one period, tau / (tau + dt)."""
     return tau / (tau + tick.dt)
 
 
-def rate_window(tick: Tick, *, gentle: bool) -> RateWindow:
+def rate_window(tick: Tick, tau: ca.SX | None) -> RateWindow:
     """Joint velocities within one period's acceleration of the last ones.
 
     Parameters
     ----------
     tick : Tick
-    gentle : bool
-        Approach velocity and position limits exponentially, with the time constant `smoothing_time`: the window's
-        outer side is kept below the way to the limit as seen that time ahead, never asking for more than `qdd_max`.
+    tau : ca.SX, scalar, or None
+        Approach velocity and position limits exponentially, with this time constant [s]: the window's outer side is
+        kept below the way to the limit as seen that time ahead, never asking for more than `qdd_max`. None: don't.
     """
     step = tick.qdd_max * tick.dt
     low, high = tick.qd_prev - step, tick.qd_prev + step
-    if not gentle:
+    if tau is None:
         return RateWindow(low, high, step)
-    keep = kept_share(tick)
-    tau = tick.parameter("smoothing_time", 0.02, lowest=0.0, unit="s")
+    keep = kept_share(tick, tau)
     ahead = tick.q + 1.5 * tau * tick.qd_prev
     to_low, to_high = velocity_bounds(
         tick.bounds, ahead, tick.q_min, tick.q_max, tick.qd_max, GENTLE * tick.qdd_max, tick.dt

@@ -41,7 +41,7 @@ class StepResult:
     setup_time, solve_time : float
         Time of set-up or update, and of the solve itself, through Python [s].
     message : str
-        One sentence where `status` is not SOLVED.
+        One sentence where `status` is not SOLVED, or where a baseline exceeds what it does not promise.
     """
 
     qd: Array

@@ -1,4 +1,4 @@
-"""What keeps a formulation calm near singularities: damping, a pull out of them, a governor for the locked rows.
+"""What keeps a formulation calm near singularities: damping, a pull out of them, a governor of the hand's speed.
 
 Sources: damping after Nakamura and Hanafusa (1986); the derivative of a singular value, u' (dJ) w with its two singular
 vectors, after Stewart and Sun, "Matrix Perturbation Theory" (1990), IV.2; the rest is this project's own, measured in
@@ -18,9 +18,11 @@ from .inverse import squared_singular_value_estimate
 if TYPE_CHECKING:
     from .tick import Tick
 
-# Wider and stronger than what `tick.inverse` has as defaults: here the pull makes up for what damping takes.
-DAMPING_THRESHOLD: Final = 0.1
-DAMPING_MAX: Final = 0.08
+# Wider and stronger than what `tick.inverse` has as defaults: here the pull makes up for what damping takes. With 0.1
+# and 0.08 the way through a singularity is so narrow that at 0.5 m/s accelerations change sign within a tick.
+DAMPING_THRESHOLD: Final = 0.2
+DAMPING_MAX: Final = 0.12
+PULL_GAIN: Final = 2.0
 # Below this share of the threshold a singular direction counts as lost, and the side to leave it by is chosen.
 LOST: Final = 0.02
 # How far ahead the side is looked up [s]: the velocity of a few ticks outweighs an encoder's noise.
@@ -83,7 +85,7 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
       :math:`\nabla (u' J_{free} N_c w) = \nabla (u' J_{free} - z' J_{fixed})\,w` where z' J_fixed is u' J_free in the
       span of the locked rows. One reverse sweep over the Jacobian, and no derivative of a factorisation.
     """
-    gain = tick.parameter("pull_gain", 1.0, lowest=0.0, unit="1/m")
+    gain = tick.parameter("pull_gain", PULL_GAIN, lowest=0.0, unit="1/m")
     nv = tick.nv
     lost2 = (LOST * measured.threshold) ** 2
     regular = inverse_of_positive(measured.gram + 0.25 * lost2 * ca.SX.eye(tick.m_free))
@@ -116,22 +118,36 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
     return gain * measured.weakness * strength * gradient / ca.sqrt(dot(gradient, gradient) + FLAT**2)
 
 
-def governor(tick: Tick, measured: Damping) -> ca.SX:
-    r"""Share of the hand's velocity, 0 to 1, at which the locked rows leave the joints enough acceleration.
+def governor(tick: Tick, measured: Damping) -> tuple[ca.SX, ca.SX]:
+    r"""Share of the hand's velocity at which the rows leave the joints enough acceleration, and what they then need.
 
-    Keeping :math:`J_{fixed}\,\dot q = 0` while the arm moves takes the accelerations
-    :math:`-J_{fixed}^+ \dot J_{fixed} \dot q`, whatever the QP wishes, and they grow without bound where the locked
-    rows become dependent. They go with the square of the speed: it is reduced until none exceeds the share
-    `governor_share` of `qdd_max`, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
+    Keeping a twist J qd while the arm moves takes the accelerations :math:`-J^\# \dot J \dot q`, whatever the QP
+    wishes, and they grow without bound where rows become dependent. They go with the square of the speed: it is
+    reduced until those for the locked rows alone take no more than the share `governor_share` of `qdd_max`, and those
+    for all rows no more than all of it, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
+
+    Returns
+    -------
+    share : ca.SX, scalar
+        0 to 1.
+    needed : ca.SX, scalar
+        Largest acceleration for all rows at that share of the speed, as a share of `qdd_max`, 0 to 1.
     """
-    share = tick.parameter("governor_share", 0.5, lowest=0.0, positive=True)
-    if not tick.m_fixed:
-        return ca.SX(1)
+    allowed = tick.parameter("governor_share", 0.3, lowest=0.0, positive=True)
     wanted = matmul(tick.J_bar.T, matmul(measured.inverse, tick.v))
     x = ca.SX.sym("x", tick.nv)
-    rate = ca.jtimes(matmul(tick.J_fixed, x), tick.q, x)
-    needed = tick.fixed.solve(ca.substitute(rate, x, ca.densify(wanted)))
-    return ca.fmin(1, ca.sqrt(share / (largest(ca.fabs(needed) / tick.qdd_max) + 1e-9)))
+    rows = [*tick.mode.free_rows, *tick.mode.fixed_rows]
+    rate = ca.jtimes(matmul(tick.J[rows, :], x), tick.q, x)
+    rate = ca.substitute(rate, x, ca.densify(wanted))
+    guided, locked, share2 = rate[: tick.m_free], ca.SX(tick.nv, 1), ca.SX(1)
+    if tick.m_fixed:
+        locked = tick.fixed.solve(rate[tick.m_free :])
+        guided = guided - matmul(tick.J_free, locked)
+        share2 = ca.fmin(1, allowed / (largest(ca.fabs(locked) / tick.qdd_max) + 1e-9))
+    whole = locked + matmul(tick.J_bar.T, matmul(measured.inverse, guided))
+    needed = largest(ca.fabs(whole) / tick.qdd_max)
+    share2 = ca.fmin(share2, 1 / (needed + 1e-9))
+    return ca.sqrt(share2), needed * share2
 
 
 def largest(values: ca.SX) -> ca.SX:

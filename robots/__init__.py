@@ -13,6 +13,7 @@ from .registry import RobotBuilder, available_robots, load_robot
 from .robot import Robot
 from .symbolic import SymbolicKinematics
 from .urdf import robot_from_urdf
+from .workspace import Workspace, sample_workspace, tool_positions
 
 __all__ = [
     "DEFAULT_PRISMATIC_QDD_MAX",
@@ -25,10 +26,13 @@ __all__ = [
     "RobotBuilder",
     "RobotError",
     "SymbolicKinematics",
+    "Workspace",
     "available_robots",
     "capsule_model",
     "finite_vector",
     "load_robot",
     "robot_from_dh",
     "robot_from_urdf",
+    "sample_workspace",
+    "tool_positions",
 ]

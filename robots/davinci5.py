@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 _REVOLUTE_QD_MAX = 1.0  # rad/s
 _PRISMATIC_QD_MAX = 0.2  # m/s: the full insertion in one second
 
-_ROWS: Final = (
+#: The table, for who wants it in letters (`kinqp.robots.dh_symbolic`).
+DAVINCI5_ROWS: Final = (
     DhRow(
         name="theta8",
         kind="revolute",
@@ -78,4 +79,4 @@ def davinci5(*, tip: str | None = None, qdd_max: ArrayLike | None = None) -> Rob
     """
     if tip not in (None, "tool"):
         raise RobotError(f"tip: expected 'tool', the only frame of davinci5, got {tip!r}")
-    return robot_from_dh("davinci5", _ROWS, tip="tool", qdd_max=qdd_max)
+    return robot_from_dh("davinci5", DAVINCI5_ROWS, tip="tool", qdd_max=qdd_max)

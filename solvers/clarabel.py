@@ -163,6 +163,7 @@ class Clarabel(Solver):
             z_box=z_box,
             iterations=answer.iterations,
             certificate=certificate,
+            own_time=answer.solve_time,
             message="" if claimed is Status.SOLVED else f"Clarabel reports {word}.",
         )
 

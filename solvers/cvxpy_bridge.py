@@ -173,6 +173,7 @@ class CvxpyBridge(Solver):
             z_box=z_box,
             iterations=int((stats and stats.num_iters) or 0),
             certificate=FarkasCertificate(*vectors) if vectors and proof else None,
+            own_time=stats.solve_time if stats else None,
             message="" if claimed is Status.SOLVED else f"{self.name} reports {word}.",
         )
 

@@ -75,6 +75,7 @@ class Piqp(Solver):
 
         backend = piqp.DenseSolver()
         backend.settings.max_iter = self._max_iterations
+        backend.settings.compute_timings = True
         for name in _TOLERANCES:
             setattr(backend.settings, name, self.tolerance)
         apply_settings(self.name, backend.settings, self._settings)
@@ -106,5 +107,6 @@ class Piqp(Solver):
             z_box=z_box,
             iterations=result.info.iter,
             certificate=certificate,
+            own_time=result.info.solve_time,
             message="" if claimed is Status.SOLVED else f"PIQP reports {word}.",
         )

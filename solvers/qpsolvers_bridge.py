@@ -12,7 +12,7 @@ import numpy as np
 from .certificates import FarkasCertificate, UnboundedRay
 from .families import Family
 from .one_sided import OneSided, require_numbers
-from .options import UnknownOptionError, gap_tolerance, one_line, tried, unknown
+from .options import OptionError, UnknownOptionError, flag, gap_tolerance, one_line, tried, unknown
 from .qpsolvers_members import MEMBERS, Member
 from .solution import RawSolution, Status
 from .solver import BackendError, Solver
@@ -39,6 +39,9 @@ class QpsolversBridge(Solver):
     tolerance
         Applied to the solver's own tolerances, see `MEMBERS`. Without effect for quadprog, which has none, and for
         solvers that are not in that table.
+    warm
+        Start from the last solution x, for solvers that qpsolvers hands one (osqp, proxqp, scs). The answer then
+        depends on the problems before.
     settings
         Further options of the solver by its own names; they override the above. They are tried at once, on a problem
         with one variable.
@@ -46,14 +49,21 @@ class QpsolversBridge(Solver):
 
     requires: ClassVar[tuple[str, ...]] = ("qpsolvers", "scipy")
 
-    def __init__(self, *, tolerance: float = 1e-9, settings: Mapping[str, object] | None = None) -> None:
+    def __init__(
+        self, *, tolerance: float = 1e-9, warm: bool = False, settings: Mapping[str, object] | None = None
+    ) -> None:
         super().__init__(tolerance=tolerance)
         self._member, self._known = self._bridged()
+        self.warm = flag("warm", warm)
+        if self.warm and not self._known.initial:
+            raise OptionError(f"{self.name}: warm must be false, because qpsolvers hands it no point to start from.")
+        self._last: Array | None = None
         given = dict(settings or {})
         accepted = max(self.tolerance, self._known.least_tolerance)
         self._options: dict[str, Any] = {
             **dict.fromkeys(self._known.tolerances, accepted),
             **dict.fromkeys(self._known.gap_tolerances, gap_tolerance(accepted)),
+            **self._known.settings,
             **given,
         }
         if given:
@@ -78,6 +88,7 @@ class QpsolversBridge(Solver):
     @final
     def _setup(self, qp: QP) -> None:
         self._rows = OneSided(qp, box=self._known.box)
+        self._last = None
         self._update(qp)
 
     @final
@@ -103,6 +114,8 @@ class QpsolversBridge(Solver):
         except Exception as error:  # what so many libraries raise has nothing in common
             raise BackendError(f"{self.name} raised {type(error).__name__}: {one_line(error)}") from error
         claimed, message = self._claim(answer, remarks)
+        if self.warm:
+            self._last = answer.x
         vectors = self._vectors(qp, answer.y, answer.z, answer.z_box)
         y, z, z_box = vectors or (None, None, None)
         return RawSolution(
@@ -113,6 +126,7 @@ class QpsolversBridge(Solver):
             z_box=z_box,
             iterations=self._known.iterations(answer.extras) if self._known.iterations and answer.extras else 0,
             certificate=self._certificate(qp, claimed, answer) if self._known.proves else None,
+            own_time=self._known.own_time(answer.extras) if self._known.own_time and answer.extras else None,
             message=message,
         )
 
@@ -130,7 +144,9 @@ class QpsolversBridge(Solver):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             # A copy of the options, because some of the functions behind this add to them.
-            answer = qpsolvers.solve_problem(qpsolvers.Problem(**data), self._member, **dict(self._options))
+            answer = qpsolvers.solve_problem(
+                qpsolvers.Problem(**data), self._member, initvals=self._last, **dict(self._options)
+            )
         # Other categories are about the use of the libraries, not about this problem.
         return answer, "; ".join(str(warning.message) for warning in caught if warning.category is UserWarning)
 
@@ -190,6 +206,7 @@ def bridge(member: str) -> type[Solver]:
         name: ClassVar[str] = f"qpsolvers:{member}"
         handles_semidefinite: ClassVar[bool] = known.semidefinite
         detects_infeasibility: ClassVar[bool] = known.proves
+        starts: ClassVar[Mapping[str, Mapping[str, object]]] = {"solution": {"warm": True}} if known.initial else {}
 
         @classmethod
         def _bridged(cls) -> tuple[str, Member]:

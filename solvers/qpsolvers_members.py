@@ -24,6 +24,8 @@ class Member:
         Its options that the tolerance and `gap_tolerance` are applied to.
     least_tolerance
         The smallest value that it accepts for them.
+    settings
+        Its options that are set otherwise than by default.
     names
         Lists the names of its settings, for solvers where qpsolvers ignores a wrong one.
     sparse, box
@@ -35,13 +37,16 @@ class Member:
         Its verdict in the extras of qpsolvers' solution, and what that means; all else is a failure.
     not_found
         What it means that nothing was found, where there is no word and no remark.
-    iterations
-        Its count in those extras.
+    iterations, own_time
+        Its count and its own time, set-up and solve [s], in those extras.
+    initial
+        Whether qpsolvers hands it a point to start from.
     """
 
     tolerances: tuple[str, ...] = ()
     gap_tolerances: tuple[str, ...] = ()
     least_tolerance: float = 0.0
+    settings: Mapping[str, object] = field(default_factory=dict)
     names: Callable[[], Iterable[str]] | None = None
     sparse: bool = False
     box: bool = True
@@ -51,6 +56,8 @@ class Member:
     statuses: Mapping[str, Status] = field(default_factory=dict)
     not_found: Status = Status.FAILED
     iterations: Callable[[Mapping[str, Any]], int] | None = None
+    own_time: Callable[[Mapping[str, Any]], float] | None = None
+    initial: bool = False
 
 
 def _names_of(module: str, settings: str) -> Callable[[], Iterable[str]]:
@@ -76,12 +83,15 @@ MEMBERS: Mapping[str, Member] = {
         proves=True,
         word=lambda extras: str(extras["status"]),
         statuses=CLARABEL_STATUSES,
+        own_time=lambda extras: float(extras["solve_time"]),
     ),
     "daqp": Member(tolerances=("primal_tol", "dual_tol")),
     "ecos": Member(tolerances=("feastol", "abstol", "reltol"), sparse=True, box=False),
     "highs": Member(
         tolerances=("primal_feasibility_tolerance", "dual_feasibility_tolerance"),
         least_tolerance=1e-10,
+        # On some QPs of robots it runs in circles without end; a second is a thousand times what others take.
+        settings={"time_limit": 1.0},
         names=_names_of("highspy", "HighsOptions"),
         sparse=True,
         semidefinite=True,
@@ -103,6 +113,8 @@ MEMBERS: Mapping[str, Member] = {
             "run time limit reached": Status.MAX_ITERATIONS,
         },
         iterations=_info_iterations,
+        own_time=lambda extras: float(extras["info"].run_time),
+        initial=True,
     ),
     "piqp": Member(
         tolerances=(
@@ -132,6 +144,7 @@ MEMBERS: Mapping[str, Member] = {
             "PROXQP_SOLVED_CLOSEST_PRIMAL_FEASIBLE": Status.INACCURATE,
         },
         iterations=_info_iterations,
+        initial=True,
     ),
     "qpalm": Member(tolerances=("eps_abs", "eps_rel"), sparse=True),
     # Exact, hence without a tolerance. That it finds nothing is its word for contradictory constraints; all else is
@@ -157,5 +170,8 @@ MEMBERS: Mapping[str, Member] = {
             "-7": Status.MAX_ITERATIONS,
         },
         iterations=lambda extras: int(extras["iter"]),
+        # SCS counts milliseconds.
+        own_time=lambda extras: 1e-3 * float(extras["setup_time"] + extras["solve_time"]),
+        initial=True,
     ),
 }

@@ -52,6 +52,7 @@ class RawSolution:
     iterations: int = 0
     certificate: Certificate | None = None
     message: str = ""
+    own_time: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -82,6 +83,10 @@ class Solution:
         Proof of infeasibility, if the backend offered one.
     message
         What went wrong, in one sentence; empty when nothing did.
+    updated
+        Whether `setup_time` is that of an update of the last set-up.
+    own_time
+        What the backend's own clock says the solve took [s]; None: it has none.
     """
 
     x: Array
@@ -96,6 +101,8 @@ class Solution:
     residuals: Residuals
     certificate: Certificate | None = None
     message: str = ""
+    updated: bool = False
+    own_time: float | None = None
 
     @property
     def solved(self) -> bool:
@@ -108,7 +115,7 @@ class Solution:
         return self.status is self.claimed
 
 
-def judge(qp: QP, raw: RawSolution, setup_time: float, solve_time: float) -> Solution:
+def judge(qp: QP, raw: RawSolution, setup_time: float, solve_time: float, *, updated: bool = False) -> Solution:
     """Turn a backend's claim into a `Solution`, believing nothing that can be recomputed.
 
     A claim is only ever lowered, never raised: what a backend itself calls inaccurate stays so.
@@ -146,6 +153,8 @@ def judge(qp: QP, raw: RawSolution, setup_time: float, solve_time: float) -> Sol
         residuals=measured,
         certificate=raw.certificate,
         message=message,
+        updated=updated,
+        own_time=raw.own_time,
     )
 
 

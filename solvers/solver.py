@@ -5,12 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from importlib.util import find_spec
 from time import perf_counter_ns
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, final
 
 from .options import positive
 from .solution import RawSolution, Solution, Status, judge
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from .qp import QP
 
 
@@ -46,6 +49,9 @@ class Solver(ABC):
     handles_semidefinite: ClassVar[bool] = False
     #: Whether it recognises problems without a solution.
     detects_infeasibility: ClassVar[bool] = False
+    #: How it can start other than from nothing, "active-set" (the last one) or "solution" (the last one), and the
+    #: options of its constructor that make it.
+    starts: ClassVar[Mapping[str, Mapping[str, object]]] = MappingProxyType({})
 
     def __init__(self, *, tolerance: float) -> None:
         self.tolerance = positive("tolerance", tolerance)
@@ -72,20 +78,21 @@ class Solver(ABC):
         """
         start = ready = perf_counter_ns()
         structure = qp.structure
+        updated = structure == self._structure
         try:
-            if structure == self._structure:
+            if updated:
                 self._update(qp)
             else:
                 self._setup(qp)
             ready = perf_counter_ns()
             raw = self._solve(qp)
             done = perf_counter_ns()
-            solution = judge(qp, raw, 1e-9 * (ready - start), 1e-9 * (done - ready))
+            solution = judge(qp, raw, 1e-9 * (ready - start), 1e-9 * (done - ready), updated=updated)
         except BACKEND_ERRORS as error:
             done = perf_counter_ns()
             text = str(error) if isinstance(error, BackendError) else f"{type(error).__name__}: {error}"
             failure = RawSolution(claimed=Status.FAILED, message=text)
-            solution = judge(qp, failure, 1e-9 * (ready - start), 1e-9 * (done - ready))
+            solution = judge(qp, failure, 1e-9 * (ready - start), 1e-9 * (done - ready), updated=updated)
         self._structure = structure if solution.status is Status.SOLVED else None
         return solution
 

@@ -1,7 +1,7 @@
 """Scenarios: what is guided, how, from where; one file each."""
 
-from .base import Scenario
+from .base import Phase, Scenario, ScenarioError, States
 from .registry import available_scenarios, get_scenario
 from .semicircle import semicircle
 
-__all__ = ["Scenario", "available_scenarios", "get_scenario", "semicircle"]
+__all__ = ["Phase", "Scenario", "ScenarioError", "States", "available_scenarios", "get_scenario", "semicircle"]

@@ -6,13 +6,30 @@ from typing import Final
 
 from ...solvers.plugins import Registry
 from .base import Scenario
+from .limits import infeasible, limit_corner, start_outside_limits
+from .random_states import random_states
 from .semicircle import semicircle
+from .singularities import singular_elbow, singular_shoulder, singular_wrist, workspace_boundary
+from .tool_modes import drill_line, mode_switch, rcm_pivot
 
 _REGISTRY: Final = Registry(
     "scenario",
     "kinqp.scenarios",
     Scenario,
-    {"semicircle": semicircle},
+    {
+        "semicircle": semicircle,
+        "singular-elbow": singular_elbow,
+        "singular-wrist": singular_wrist,
+        "singular-shoulder": singular_shoulder,
+        "workspace-boundary": workspace_boundary,
+        "drill-line": drill_line,
+        "rcm-pivot": rcm_pivot,
+        "limit-corner": limit_corner,
+        "mode-switch": mode_switch,
+        "random-states": random_states,
+        "start-outside-limits": start_outside_limits,
+        "infeasible": infeasible,
+    },
 )
 
 

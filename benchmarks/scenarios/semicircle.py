@@ -9,7 +9,7 @@ import numpy as np
 from ...control import PathFollower, SemicirclePath
 from ...formulations import DEFAULT_DT, Mode
 from ...robots import load_robot
-from .base import Scenario
+from .base import Phase, Scenario
 
 # Tool pointing down, 6 cm above the table, elbow at -90 deg; chosen among round numbers such that the semicircle runs
 # 3 cm deep into the elbow limit and all else (other limits, singularities) stays out of play.
@@ -44,10 +44,8 @@ def semicircle() -> Scenario:
         name="semicircle",
         description="the thesis's experiment: a vertical semicircle into the elbow limit, orientation fixed",
         robot=robot,
-        mode=Mode.fix_orientation(),
         q0=q0,
-        guide=guide,
-        duration=guide.duration,
         dt=DEFAULT_DT,
-        watched_joint=3,
+        phases=(Phase(Mode.fix_orientation(), guide, guide.duration),),
+        watched_joints=(3,),
     )

@@ -78,10 +78,19 @@ class SingularPath:
             duration = leg.length / speed + RAMP
             if t < duration:
                 direction = np.array(leg.direction) / np.linalg.norm(leg.direction)
-                velocity: Array = speed * _smooth(t / RAMP) * _smooth((duration - t) / RAMP) * direction
+                velocity: Array = speed * ramped(t, duration) * direction
                 return velocity
             t -= duration
         return np.zeros(3)
+
+    def twist(self, t: float, speed: float) -> Array:
+        """Twist asked for at time `t` [s], shape (6,) along the axes of the mode [m/s, rad/s]."""
+        return np.concatenate([self.velocity(t, speed), np.zeros(3)])
+
+
+def ramped(t: float, duration: float) -> float:
+    """Share of its speed that a hand has at `t` on a way from rest to rest [-]."""
+    return _smooth(t / RAMP) * _smooth((duration - t) / RAMP)
 
 
 def _smooth(x: float) -> float:
@@ -136,6 +145,12 @@ def singular_paths() -> tuple[SingularPath, ...]:
         SingularPath(
             "shoulder", "shoulder: joint 2 through zero, joint 3 at 90 deg", (0, 25, 90, -80, 0, 60, 0),
             (Leg(_towards((0, 25, 90, -80, 0, 60, 0), (0, 0, 90, -80, 0, 60, 0)), 0.3),),
+        ),
+        SingularPath(
+            # Joint 3 is what it takes for plain `joint-space` to meet the singularity itself: sigma_min below 1e-4.
+            "shoulder, through", "shoulder: exactly through joint 2 zero, joint 3 at 90 deg",
+            (0, 25, 89.6792915824710223, -60, 0, 60, 0),
+            (Leg(_towards((0, 25, 90, -60, 0, 60, 0), (0, 0, 90, -60, 0, 60, 0)), 0.3),),
         ),
         SingularPath(
             "over", "over the base, where the wrist crosses the first axis, to the edge behind it",

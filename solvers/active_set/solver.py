@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, final
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..solver import Solver
 from .library import load
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..qp import QP
 
 #: In the order of ``kinqp_status``.
@@ -50,6 +53,7 @@ class ActiveSet(Solver):
     requires: ClassVar[tuple[str, ...]] = ("cffi",)
     handles_semidefinite: ClassVar[bool] = True
     detects_infeasibility: ClassVar[bool] = True
+    starts: ClassVar[Mapping[str, Mapping[str, object]]] = MappingProxyType({"active-set": {"warm": True}})
 
     def __init__(self, *, tolerance: float = 1e-9, max_iterations: int | None = None, warm: bool = False) -> None:
         super().__init__(tolerance=tolerance)

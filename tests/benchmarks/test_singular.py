@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinqp.benchmarks.scenarios.random_paths import random_paths
 from kinqp.benchmarks.scenarios.singular import SingularPath, hard_paths, singular_paths
 from kinqp.benchmarks.singular import (
     DISTURBANCES,
@@ -23,7 +24,7 @@ from kinqp.formulations import get_formulation
 from kinqp.robots import load_robot
 
 PATHS = {path.name: path for path in (*singular_paths(), *hard_paths())}
-SWEEP = tuple(path.name for path in singular_paths())
+FAST = next(disturbance for disturbance in DISTURBANCES if disturbance.speed == 0.5)
 
 
 @functools.cache
@@ -97,9 +98,46 @@ def test_a_limit_at_the_singularity_and_disturbances() -> None:
     assert run("joint-space", limited).peak_acceleration > 1.0
     lag_and_noise = next(d for d in DISTURBANCES if d.noise and d.lag)
     check_calm(run("joint-space-robust", shortened(PATHS["outward"]), lag_and_noise))
-    fast = run("joint-space-robust", PATHS["outward"], next(d for d in DISTURBANCES if d.speed == 0.5))
-    assert fast.peak_acceleration <= 1.0 + 1e-6
-    assert fast.fixed_error <= 1e-9
+    check_calm(run("joint-space-robust", PATHS["outward"], FAST))
+    check_calm(run("joint-space-robust", PATHS["wrist"], FAST))
+
+
+def test_a_path_leads_exactly_through_the_shoulder_singularity() -> None:
+    """Plain joint-space meets it; the robust one is as calm as elsewhere and loses less than a fifth of a second."""
+    path = PATHS["shoulder, through"]
+    plain = singular_run(step("joint-space", path.mode), path, Disturbance(), every=1)
+    assert plain.sigma_min < 1e-3
+    for disturbance in (Disturbance(), FAST):
+        robust = run("joint-space-robust", path, disturbance)
+        check_calm(robust)
+        assert robust.lost < 0.2
+
+
+def test_random_paths_are_reproducible_and_keep_their_speeds() -> None:
+    robot = load_robot("ur5e")
+    few, many = random_paths(robot, "rcm:-0.12", 2, 5), random_paths(robot, "rcm:-0.12", 3, 5)
+    for one, other in zip(few, many, strict=False):
+        np.testing.assert_array_equal(one.q0, other.q0)
+        np.testing.assert_array_equal(one.legs, other.legs)
+    path = many[2]
+    middle = path.twist(1.0, 0.15)
+    assert np.linalg.norm(middle[:3]) == pytest.approx(0.15, abs=1e-12)
+    assert np.linalg.norm(middle[3:]) == pytest.approx(1.5, abs=1e-12)
+    assert middle @ path.twist(path.duration(0.15) - 1.0, 0.15) < 0.0
+    for t in (0.0, path.duration(0.15) / 2.0, path.duration(0.15)):
+        np.testing.assert_allclose(path.twist(t, 0.15), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("formulation", ["joint-space-robust", "cartesian-error-robust"])
+def test_random_paths_keep_limits_and_locked_rows(formulation: str) -> None:
+    robot = load_robot("ur5e")
+    row = singular_run(
+        compile_step(robot, formulation, "fix-orientation"), random_paths(robot, "fix-orientation", 1, 2)[0], FAST
+    )
+    assert row.failed == 0
+    assert row.peak_speed <= 1.0 + 1e-9
+    assert row.peak_acceleration <= 1.0 + 1e-6
+    assert row.fixed_error <= 1e-9
 
 
 def test_table_has_every_row() -> None:
@@ -122,11 +160,10 @@ def test_robust_formulations_are_calm_on_all_paths(formulation: str, name: str) 
 @pytest.mark.parametrize("disturbance", DISTURBANCES, ids=lambda disturbance: disturbance.name)
 @pytest.mark.parametrize("name", PATHS)
 def test_disturbed_they_keep_all_limits(formulation: str, disturbance: Disturbance, name: str) -> None:
-    """No chatter is promised at 0.5 m/s, nor from the exact singularity of the locked rows with noise."""
+    """No calm is promised from the exact singularity of the locked rows with noise."""
     row = run(formulation, PATHS[name], disturbance)
     assert row.failed == 0
     assert row.peak_acceleration <= 1.0 + 1e-6
     assert row.fixed_error <= 1e-9
-    if disturbance.speed == 0.15 and name != "upright":
-        # A smooth reversal that noise pushes over the counting threshold is one sign change in four seconds.
-        assert row.chatter <= (0.3 if disturbance.noise else 0.0)
+    if name != "upright" or not disturbance.noise:
+        assert row.chatter == 0.0

@@ -1,142 +1,223 @@
-"""Sweeps: what is run, in which order, what is kept."""
+"""Sweeps: what is run and kept, whatever happens meanwhile."""
 
-from collections.abc import Callable
-from pathlib import Path
+from __future__ import annotations
+
+import errno
+import io
+import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 import pytest
-from numpy.typing import ArrayLike
 
-from kinqp.benchmarks import Cell, Store, StoreError, SweepConfig, cells_of, make_config, sweep
-from kinqp.control import InterpretedStep
-from kinqp.formulations import StepResult
+from kinqp.benchmarks import Cell, Store, StoreError, cells_of, make_config, sweep, sweep_table
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+HERE = "tests.benchmarks.tiny:"
 TINY = {
-    "scenarios": ["tests.benchmarks.tiny:tiny"],
+    "scenarios": [HERE + "tiny"],
     "formulations": ["cartesian-error", "joint-space"],
-    "solvers": ["thesis-active-set", "clarabel(tolerance=1e-8)"],
-    "repeats": 3,
-    "warm_up": 2,
+    "solvers": ["active-set", "clarabel(tolerance=1e-8)"],
+    "starts": ["cold", "active-set"],
+    "repeats": 2,
+    "timing_ticks": 4,
+    "timing_window": 2,
 }
+CELLS = 6
+# What two runs can't have in common.
+CLOCKS = ("setup_time", "update_time", "solve_time")
+# `position` aside: it follows from q.
+COLUMNS = {
+    "t", "phase", "q", "qd", "qd_lo", "qd_hi", "v", "eps", "status", "claimed", "iterations", "active", "fixed_error",
+    "bound_violation", "sigma_min", "task_scale", "reference_error", *CLOCKS, "message",
+}  # fmt: skip
 
 
-def stop_after(runs: int) -> Callable[[int, int, str], None]:
-    def on_progress(done: int, total: int, cell: str) -> None:
-        assert total == 12
-        assert cell or done == total
-        if done == runs:
+def same_accuracy(a: Store, b: Store) -> None:
+    assert a.cells() == b.cells()
+    for cell in a.cells():
+        assert a.ticks(cell).drop(CLOCKS).equals(b.ticks(cell).drop(CLOCKS)), cell
+
+
+def interrupt_after(parts: int) -> Callable[[int, int, str], None]:
+    def on_progress(done: int, total: int, _what: str) -> None:
+        assert total == 2 * CELLS
+        if done == parts:
             raise KeyboardInterrupt
 
     return on_progress
 
 
-def test_every_cell_is_run_and_stored_with_every_column(tmp_path: Path) -> None:
-    store = sweep(TINY, tmp_path / "out")
-    config, conditions = store.manifest()
-    assert config == make_config(dict(TINY))
-    assert {"cpu", "cores", "python", "numpy", "clarabel", "piqp", "date"} <= set(conditions)
-    assert len(cells_of(config)) == 4
-    for cell in cells_of(config):
-        frame = store.read(cell)
-        assert len(frame) == 20
-        assert store.repeats_done(cell) == 3
-        for name, width in (("q", 7), ("qd", 7), ("v", 3), ("eps", 3), ("position", 3)):
-            assert frame[name].to_numpy().shape == (20, width)
-        for name in ("setup_time", "solve_time"):
-            times = frame[name].to_numpy()
-            assert times.shape == (20, 3)
-            assert (times > 0.0).all()
-        assert set(frame["status"]) == {"solved"}
-        assert frame.schema["active"] == pl.List(pl.String)
-        np.testing.assert_allclose(frame["t"].to_numpy(), 1e-3 * np.arange(20))
-        for name in ("fixed_error", "bound_violation", "sigma_min", "iterations", "message"):
-            assert frame[name].null_count() == 0
-    assert not list((tmp_path / "out").rglob("*.partial"))
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return sweep(TINY, tmp_path_factory.mktemp("whole"), workers=1)
 
 
-def test_interrupted_sweep_keeps_its_runs_and_resumes_with_the_rest(tmp_path: Path) -> None:
+def test_every_cell_is_run_and_stored_with_every_column(whole: Store) -> None:
+    manifest = whole.manifest
+    assert manifest.config.model_dump() == make_config(dict(TINY)).model_dump()
+    assert {"cpu", "cores", "timing", "compiler", "git", "python", "numpy", "date"} <= set(manifest.conditions)
+    assert manifest.skipped == {
+        "clarabel(tolerance=1e-8) from last active-set": "clarabel(tolerance=1e-8) starts cold only"
+    }
+    assert len(whole.cells()) == len(manifest.cells) == CELLS
+    assert whole.failed() == {}
+    for cell in whole.cells():
+        ticks, times = whole.ticks(cell), whole.times(cell)
+        assert set(ticks.columns) == COLUMNS
+        assert len(ticks) == 20
+        assert {ticks.schema[name] for name in ("q", "qd", "qd_lo", "qd_hi")} == {pl.Array(pl.Float64, 7)}
+        assert {ticks.schema[name] for name in ("v", "eps")} == {pl.List(pl.Float64)}
+        assert ticks.schema["active"] == pl.List(pl.String)
+        assert all(ticks[name].null_count() == 0 for name in ticks.columns)
+        assert times is not None
+        assert times.columns == ["tick", "repeat", "wall_setup", "wall_update", "wall_solve", "own", "c"]
+        assert set(times["repeat"]) == {0, 1}
+        outcome = whole.outcome(cell)
+        assert (outcome.accuracy.loop, outcome.accuracy.ticks) == ("closed", 20)
+        assert (outcome.timing.ticks, outcome.timing.repeats, outcome.timing.deterministic) == (4, 2, True)
+    assert not list(whole.folder.rglob("*.partial"))
+    assert len(list((whole.folder / "problems").iterdir())) == 2
+
+
+def test_the_number_of_workers_does_not_show(whole: Store, tmp_path: Path) -> None:
+    same_accuracy(sweep(TINY, tmp_path, workers=2), whole)
+
+
+@pytest.mark.parametrize("parts", [2, CELLS + 1])
+def test_an_interrupted_sweep_is_continued_with_the_rest(whole: Store, tmp_path: Path, parts: int) -> None:
     with pytest.raises(KeyboardInterrupt):
-        sweep(TINY, tmp_path, on_progress=stop_after(7))
+        sweep(TINY, tmp_path, workers=1, on_progress=interrupt_after(parts))
     store = Store(tmp_path)
-    cells = cells_of(store.manifest()[0])
-    assert sum(store.repeats_done(cell) for cell in cells) == 7
-    kept = {cell: store.read(cell)["solve_time"].to_numpy() for cell in cells}
+    kept = {path: path.read_bytes() for name in ("ticks", "times") for path in (tmp_path / name).iterdir()}
+    assert min(parts, CELLS) <= len(kept) <= parts + 1
     seen: list[int] = []
-    sweep(TINY, tmp_path, resume=True, on_progress=lambda done, _total, _cell: seen.append(done))
-    assert seen == [7, 8, 9, 10, 11, 12]
-    for cell in cells:
-        times = store.read(cell)["solve_time"].to_numpy()
-        assert times.shape == (20, 3)
-        np.testing.assert_array_equal(times[:, : kept[cell].shape[1]], kept[cell])
+    sweep(TINY, tmp_path, resume=True, workers=1, on_progress=lambda done, _total, _what: seen.append(done))
+    assert seen[0] == len(kept)
+    assert seen[-1] == 2 * CELLS
+    for path, content in kept.items():
+        assert path.read_bytes() == content
+    same_accuracy(store, whole)
+    assert store.failed() == {}
 
 
-def test_a_finished_sweep_resumes_to_nothing(tmp_path: Path) -> None:
-    sweep(TINY | {"repeats": 1}, tmp_path)
-    before = {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")}
-    sweep(TINY | {"repeats": 1}, tmp_path, resume=True)
-    assert {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")} == before
-
-
-def test_a_folder_with_a_sweep_is_not_overwritten_unasked(tmp_path: Path) -> None:
-    sweep(TINY | {"repeats": 1}, tmp_path)
+def test_a_finished_sweep_is_continued_by_nothing_and_not_overwritten_unasked(whole: Store) -> None:
+    before = {path: path.read_bytes() for path in whole.folder.rglob("*.*")}
+    sweep(TINY, whole.folder, resume=True)
+    assert {path: path.read_bytes() for path in whole.folder.rglob("*.*")} == before
     with pytest.raises(StoreError, match=r"holds a sweep already: give --resume .* --overwrite .* --out"):
-        sweep(TINY | {"repeats": 1}, tmp_path)
+        sweep(TINY, whole.folder)
     with pytest.raises(StoreError, match="another configuration"):
-        sweep(TINY | {"repeats": 2}, tmp_path, resume=True)
-    one = TINY | {"repeats": 1, "solvers": ["piqp"]}
-    store = sweep(one, tmp_path, overwrite=True)
-    assert sorted(path.stem for path in (tmp_path / "cells").iterdir()) == sorted(
-        Path(cell.file_name).stem for cell in cells_of(store.manifest()[0])
-    )
+        sweep(TINY | {"repeats": 3}, whole.folder, resume=True)
+    with pytest.raises(StoreError, match="either --resume or --overwrite"):
+        sweep(TINY, whole.folder, resume=True, overwrite=True)
+
+
+def test_solvers_that_crash_hang_or_are_mistaken_end_their_cells_alone(tmp_path: Path) -> None:
+    solvers = [HERE + name for name in ("Crashing", "CrashingLate", "Hanging", "Mistaken")]
+    config = TINY | {
+        "formulations": ["joint-space"], "solvers": [*solvers, "active-set"], "starts": ["cold"], "cell_timeout": 2.0,
+        "timing_ticks": 18, "timing_window": 18,
+    }  # fmt: skip
+    store = sweep(config, tmp_path, workers=2)
+    crashing, late, hanging, mistaken, honest = store.manifest.cells
+    assert store.failed() == {
+        crashing: "the process was ended by SIGSEGV",
+        late: "the process was ended by SIGSEGV",
+        hanging: "the process took longer than 2 s and was stopped",
+        mistaken: "KeyError: 'no such row'",
+    }
+    assert store.cells() == (late, honest)
+    assert store.outcome(late).accuracy.state == "done"
+    assert store.times(late) is None
+    assert store.times(honest) is not None
+    assert (store.ticks(honest)["status"] == "solved").all()
+
+
+def test_a_block_that_cannot_be_begun_ends_its_cells_alone(tmp_path: Path) -> None:
+    config = TINY | {
+        "scenarios": [HERE + "unknown_input", HERE + "tiny"],
+        "formulations": ["joint-space"],
+        "solvers": ["active-set"],
+        "starts": ["cold"],
+    }
+    store = sweep(config, tmp_path, workers=1)
+    lost, kept = store.manifest.cells
+    assert store.cells() == (kept,)
+    assert "the scenario gives wind" in store.failed()[lost]
+
+
+def test_a_full_disk_ends_what_does_not_fit_and_leaves_no_halves(
+    whole: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    honest, calls = os.fsync, iter(range(1000))
+
+    def full(handle: int) -> None:
+        if next(calls) in (3, 4, 12):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        honest(handle)
+
+    monkeypatch.setattr(os, "fsync", full)
+    store = sweep(TINY, tmp_path, workers=1)
+    assert len(store.unwritten) == 3
+    assert all("No space left" in why for why in store.unwritten.values())
+    assert not list(tmp_path.rglob("*.partial"))
+    for path in tmp_path.rglob("*.parquet"):
+        assert len(pl.read_parquet(path)) > 0
+    monkeypatch.undo()
+    again = sweep(TINY, tmp_path, resume=True, workers=1)
+    assert again.unwritten == {}
+    assert again.failed() == {}
+    same_accuracy(again, whole)
+    assert all(again.times(cell) is not None for cell in again.cells())
 
 
 def test_a_sweep_measured_elsewhere_is_not_continued(tmp_path: Path) -> None:
-    sweep(TINY | {"repeats": 1}, tmp_path)
+    config = TINY | {"formulations": ["joint-space"], "solvers": ["active-set"], "starts": ["cold"]}
+    store = sweep(config, tmp_path, workers=1)
     manifest = tmp_path / "manifest.json"
-    text = manifest.read_text()
-    cpu = Store(tmp_path).manifest()[1]["cpu"]
-    manifest.write_text(text.replace(cpu, "Another CPU"))
+    manifest.write_text(manifest.read_text().replace(store.manifest.conditions["cpu"], "Another CPU"))
     with pytest.raises(StoreError, match="was measured with cpu 'Another CPU'"):
-        sweep(TINY | {"repeats": 1}, tmp_path, resume=True)
-
-
-def test_the_order_is_shuffled_anew_in_every_repeat_and_by_seed(tmp_path: Path) -> None:
-    def order(seed: int, out: Path) -> list[list[str]]:
-        cells: list[str] = []
-        sweep(TINY | {"seed": seed}, out, on_progress=lambda _done, _total, cell: cells.append(cell))
-        return [cells[i : i + 4] for i in (0, 4, 8)]
-
-    first, again, other = order(0, tmp_path / "a"), order(0, tmp_path / "b"), order(1, tmp_path / "c")
-    assert first == again
-    assert first != other
-    assert all(sorted(repeat) == sorted(first[0]) for repeat in first)
-    assert first[0] != first[1] or first[1] != first[2]
-
-
-def test_a_controller_that_is_not_deterministic_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = iter(range(10_000))
-    honest = InterpretedStep.__call__
-
-    def drifting(self: InterpretedStep, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
-        return honest(self, q, np.asarray(v) * (1.0 + 1e-9 * next(calls)), **inputs)
-
-    monkeypatch.setattr(InterpretedStep, "__call__", drifting)
-    with pytest.raises(StoreError, match="expected the same commands in every run"):
-        sweep(TINY, tmp_path)
+        sweep(config, tmp_path, resume=True)
 
 
 def test_a_manifest_that_cannot_be_read_says_so(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"expected a sweep's manifest\.json there"):
-        Store(tmp_path).manifest()
+        _ = Store(tmp_path).manifest
     (tmp_path / "manifest.json").write_text('{"format": 99}')
-    with pytest.raises(StoreError, match="expected format 1, got 99"):
-        Store(tmp_path).manifest()
+    with pytest.raises(StoreError, match="expected format 2, got 99"):
+        _ = Store(tmp_path).manifest
 
 
 def test_cells_have_files_of_their_own() -> None:
-    config = SweepConfig(solvers=("clarabel", "clarabel(tolerance=1e-8)", "clarabel(tolerance=1e-7)"))
-    names = {cell.file_name for cell in cells_of(config)}
-    assert len(names) == len(cells_of(config)) == 6
-    assert all("/" not in name and "(" not in name for name in names)
+    names = ("clarabel", "clarabel(tolerance=1e-8)", "clarabel(tolerance=1e-7)", "clarabel_tolerance=1e-7_", "x" * 300)
+    stems = {Cell("a", "b", name).file_stem for name in names}
+    assert len(stems) == 5
+    assert all(len(stem) < 220 and "/" not in stem and "(" not in stem for stem in stems)
     assert str(Cell("a", "b", "c")) == "a / b / c"
+    assert str(Cell("a", "b", "c", "active-set")) == "a / b / c from last active-set"
+    config = make_config(dict(TINY) | {"more": [{"solvers": ["piqp"]}, dict(TINY) | {"repeats": 2}][:1]})
+    assert len(cells_of(config)) == len({cell.file_stem for cell in cells_of(config)}) == CELLS + 2
+
+
+def test_a_config_written_and_read_again_means_the_same(whole: Store) -> None:
+    read = Store(whole.folder).manifest.config
+    assert cells_of(make_config(read.model_dump())) == whole.manifest.cells
+    assert np.isfinite(read.timing_budget)
+
+
+def test_the_table_has_a_row_for_every_cell(whole: Store) -> None:
+    from rich.console import Console
+
+    from kinqp.benchmarks import TABLE_WIDTH
+
+    console = Console(width=TABLE_WIDTH, record=True, file=io.StringIO())
+    console.print(sweep_table(whole))
+    text = console.export_text()
+    assert text.count("active-set") >= 6
+    assert "…" not in text
+    assert "watched joints: 4" in text

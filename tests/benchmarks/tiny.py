@@ -1,9 +1,132 @@
-"""A scenario of a few ticks, for tests of the machinery around it."""
+"""Scenarios of a few ticks, and solvers that misbehave, for tests of the machinery around them."""
 
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import time
 from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
 
-from kinqp.benchmarks import Scenario, get_scenario
+import numpy as np
+
+from kinqp.benchmarks import Phase, Scenario, States, get_scenario
+from kinqp.formulations import Mode
+from kinqp.solvers import Solver, get_solver
+from kinqp.solvers.solution import RawSolution
+
+if TYPE_CHECKING:
+    from kinqp.solvers import QP
 
 
 def tiny() -> Scenario:
-    return replace(get_scenario("semicircle"), name="tiny", duration=0.02)
+    """Twenty ticks of the semicircle."""
+    scenario = get_scenario("semicircle")
+    return replace(scenario, name="tiny", phases=(replace(scenario.only_phase, duration=0.02),))
+
+
+def two_phases() -> Scenario:
+    """Eight ticks with the orientation locked, then six on a line: other sizes."""
+    scenario = get_scenario("semicircle")
+    guide = scenario.guide
+    phases = (Phase(Mode.fix_orientation(), guide, 0.008), Phase(Mode.line("z"), guide, 0.006))
+    return replace(scenario, name="two_phases", phases=phases)
+
+
+def three_states() -> Scenario:
+    """Three states, from rest, within velocity limits narrower than the arm's."""
+    scenario = get_scenario("semicircle")
+    q = scenario.q0 + np.array([[0.0], [0.1], [0.2]])
+    v = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.1, 0.2]])
+    states = States(Mode.fix_orientation(), q, np.zeros((3, 7)), v)
+    inputs = {"qd_max": np.full(7, 0.1)}
+    return replace(scenario, name="three_states", phases=(), states=states, inputs=inputs)
+
+
+def unknown_input() -> Scenario:
+    """With an input that no formulation takes."""
+    return replace(tiny(), name="unknown_input", inputs={"wind": 1.0})
+
+
+class Delegating(Solver):
+    """Solves as the active set does, after something of its own."""
+
+    name: ClassVar[str] = "delegating"
+
+    def __init__(self) -> None:
+        super().__init__(tolerance=1e-9)
+        self._solver = get_solver("active-set")
+        self._calls = itertools.count(1)
+
+    def before(self, call: int) -> None:
+        """Do something before the solve of this number."""
+
+    def after(self, x: np.ndarray, call: int) -> np.ndarray:  # noqa: ARG002  # for subclasses
+        """Change the answer."""
+        return x
+
+    def _setup(self, qp: QP) -> None:
+        pass
+
+    def _update(self, qp: QP) -> None:
+        pass
+
+    def _solve(self, qp: QP) -> RawSolution:
+        call = next(self._calls)
+        self.before(call)
+        s = self._solver.solve(qp)
+        return RawSolution(claimed=s.status, x=self.after(s.x, call), y=s.y, z=s.z, z_box=s.z_box, iterations=7)
+
+
+class Crashing(Delegating):
+    """Ends its process in the middle of the run."""
+
+    def before(self, call: int) -> None:
+        if call == 10:
+            os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class CrashingLate(Delegating):
+    """Lasts for the run, and not for its repetitions."""
+
+    def before(self, call: int) -> None:
+        if call == 30:
+            os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Hanging(Delegating):
+    """Never comes back."""
+
+    def before(self, call: int) -> None:
+        if call == 10:
+            time.sleep(3600.0)
+
+
+class Mistaken(Delegating):
+    """Has a mistake in its code."""
+
+    def before(self, call: int) -> None:
+        if call == 10:
+            raise KeyError("no such row")
+
+
+class Drifting(Delegating):
+    """Answers differently every time, by less than is noticed."""
+
+    def after(self, x: np.ndarray, call: int) -> np.ndarray:
+        return x * (1.0 + 1e-13 * call)
+
+
+class Lying(Delegating):
+    """Claims to have solved what it has not."""
+
+    def after(self, x: np.ndarray, call: int) -> np.ndarray:
+        return x + 1e-3 if call % 2 == 0 else x
+
+
+class Slow(Delegating):
+    """Takes its time."""
+
+    def before(self, call: int) -> None:  # noqa: ARG002  # as of the others
+        time.sleep(0.01)

@@ -1,12 +1,15 @@
 """The command, as people type it."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -14,7 +17,8 @@ TINY = """
 scenarios = ["tests.benchmarks.tiny:tiny"]
 solvers = ["thesis-active-set", "piqp"]
 repeats = 2
-warm_up = 2
+timing_ticks = 4
+timing_window = 2
 """
 
 
@@ -45,7 +49,7 @@ def test_list_names_everything() -> None:
     assert done.returncode == 0
     for name in (
         "lbr_med14", "lbr_med7", "ur5e", "davinci5", "fix-orientation", "rcm", "cartesian-error", "joint-space",
-        "thesis-active-set", "clarabel", "piqp", "semicircle",
+        "thesis-active-set", "clarabel", "piqp", "semicircle", "task-priority", "saturation-null-space",
     ):  # fmt: skip
         assert name in done.stdout.split(), name
 
@@ -68,13 +72,16 @@ def test_sweep_prints_the_table_and_says_where_it_wrote(config: Path, tmp_path: 
         assert text in done.stdout
     assert "…" not in done.stdout, "no figure is cut"
     assert str(out) in done.stdout.replace("\n", "")
-    assert len(list((out / "cells").glob("*.parquet"))) == 4
+    assert len(list((out / "ticks").glob("*.parquet"))) == len(list((out / "times").glob("*.parquet"))) == 4
     again = kinqp("sweep", config, "--out", out)
     assert again.returncode == 2
     assert "--resume" in again.stderr
     assert "Traceback" not in again.stderr
-    assert kinqp("sweep", config, "--out", out, "--resume").returncode == 0
-    assert kinqp("sweep", config, "--out", out, "--overwrite").returncode == 0
+    assert kinqp("sweep", config, "--out", out, "--resume", "--workers", "1").returncode == 0
+    nobody = kinqp("sweep", config, "--out", tmp_path / "cluster", "--scheduler", "nowhere")
+    assert nobody.returncode == 2
+    assert "expected an address such as tcp://host:8786, got 'nowhere'" in nobody.stderr.replace("\n", " ")
+    assert "Traceback" not in nobody.stderr
 
 
 @pytest.mark.parametrize(
@@ -96,26 +103,73 @@ def test_a_mistake_is_one_sentence_and_nothing_is_written(tmp_path: Path, text: 
     assert not (tmp_path / "out").exists()
 
 
-def test_ctrl_c_keeps_the_runs_done(tmp_path: Path) -> None:
+def test_ctrl_c_keeps_the_cells_done(tmp_path: Path) -> None:
     path, out = tmp_path / "long.toml", tmp_path / "out"
     path.write_text(TINY.replace("repeats = 2", "repeats = 100000"))
-    process = subprocess.Popen(
-        command("sweep", path, "--out", out),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
-    deadline = time.monotonic() + 60.0
-    while not list(out.glob("cells/*.parquet")) and time.monotonic() < deadline:
-        time.sleep(0.05)
+    process = begin(path, out)
+    wait_for(lambda: len(list(out.glob("ticks/*.parquet"))) == 4, process)
     process.send_signal(signal.SIGINT)
     stdout, stderr = process.communicate(timeout=60)
     assert process.returncode == 130, stderr
     assert "Interrupted" in stdout
     assert "--resume" in stdout
     assert "Traceback" not in stderr
-    assert list(out.glob("cells/*.parquet"))
+    assert len(list(out.glob("ticks/*.parquet"))) == 4
+
+
+def test_kill_minus_nine_three_times_loses_at_most_what_was_being_run(tmp_path: Path) -> None:
+    path, out = tmp_path / "sweep.toml", tmp_path / "out"
+    path.write_text(TINY)
+
+    def cells_ended() -> int:
+        return len(list(out.glob("cells/*.json")))
+
+    def times() -> int:
+        return len(list(out.glob("times/*.parquet")))
+
+    kept: dict[Path, bytes] = {}
+    for reached in (lambda: cells_ended() >= 1, lambda: cells_ended() >= 3, lambda: times() >= 1):
+        process = begin(path, out, *(["--resume"] if out.exists() else []))
+        wait_for(reached, process)
+        process.kill()
+        process.communicate(timeout=60)
+        for file, content in kept.items():
+            assert file.read_bytes() == content
+        for file in [*out.glob("ticks/*.parquet"), *out.glob("times/*.parquet")]:
+            assert len(pl.read_parquet(file)) >= 4, "whole, every one of them"
+        # What a cell's record calls done is not done again; a file that was to be recorded next was being run.
+        kept = {}
+        for record in out.glob("cells/*.json"):
+            for folder, part in (("ticks", "accuracy"), ("times", "timing")):
+                if (ended := json.loads(record.read_text())[part]) is not None:
+                    assert ended["state"] == "done"
+                    file = out / folder / f"{record.stem}.parquet"
+                    kept[file] = file.read_bytes()
+    done = kinqp("sweep", path, "--out", out, "--resume")
+    assert done.returncode == 0, done.stderr
+    assert cells_ended() == times() == 4
+    assert "failed:" not in done.stdout
+    assert not list(out.rglob("*.partial"))
+    for file, content in kept.items():
+        assert file.read_bytes() == content
+
+
+def begin(config: Path, out: Path, *options: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        command("sweep", config, "--out", out, "--workers", "1", *options),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+
+
+def wait_for(reached: Callable[[], bool], process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 60.0
+    while not reached():
+        assert process.poll() is None, "it ended before it could be interrupted"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
 
 
 def test_export_writes_a_folder_and_says_what_next(tmp_path: Path) -> None:

@@ -35,14 +35,19 @@ def test_other_python_in_the_readme_runs() -> None:
 
 
 @pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.name)
-def test_python_in_the_docs_runs(page: Path) -> None:
+def test_python_in_the_docs_runs(page: Path, tmp_path: Path) -> None:
     for example in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL):
-        run(example)
+        run(example, tmp_path)
 
 
-def run(example: str) -> subprocess.CompletedProcess[str]:
+def run(example: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", example], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-W", "error", "-c", example],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        cwd=folder,
     )
     assert done.returncode == 0, done.stderr
     return done
@@ -52,7 +57,11 @@ def test_readme_sweep_is_a_valid_configuration(tmp_path: Path) -> None:
     (text,) = blocks("toml")
     path = tmp_path / "my_sweep.toml"
     path.write_text(text)
-    assert load_config(path).repeats == 3
+    assert load_config(path).starts == ("cold", "active-set")
+    page = (ROOT / "docs" / "sweep.md").read_text(encoding="utf-8")
+    (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
+    path.write_text(text)
+    assert load_config(path).samples == 200
     with pytest.raises(ConfigError):
         make_config({"formulation": []})
 
@@ -95,7 +104,7 @@ def test_singularities_page_argues_for_the_defaults() -> None:
     page = (ROOT / "docs" / "singularities.md").read_text(encoding="utf-8")
     assert f"The joint weight** is {ROBUST_JOINT_WEIGHT:.0e}".replace("e-03", "e-3") in page
     calm = [line.split("|") for line in page.splitlines() if "| as it is | joint-space-robust |" in line]
-    assert len(calm) == 12
+    assert len(calm) == 13
     for row in calm:
         assert float(row[6]) <= 1.0, row
         assert float(row[7]) == 0.0, row

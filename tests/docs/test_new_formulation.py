@@ -27,7 +27,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "my_formulations.py").write_text(block("py"))
     (folder / "pyproject.toml").write_text(block("toml"))
     # The page's sweep is the whole semicircle; two hundredths of a second of it will do here.
-    (folder / "sweep.toml").write_text(block("toml", 1) + 'scenarios = ["tests.benchmarks.tiny:tiny"]\nwarm_up = 2\n')
+    (folder / "sweep.toml").write_text(block("toml", 1) + 'scenarios = ["tests.benchmarks.tiny:tiny"]\n')
     return folder
 
 
@@ -75,7 +75,7 @@ def test_it_is_listed_described_swept_and_exported(project: Path, installed: Pat
     assert "| joint limits | bound | 7 | x[0-6] |" in printed["describe"]
     (row,) = [line for line in printed["sweep"].splitlines() if line.split()[:1] == ["resting"]]
     assert row.split()[1] == "active-set"
-    assert len(list((tmp_path / "results" / "cells").glob("*resting*.parquet"))) == 2
+    assert len(list((tmp_path / "results" / "ticks").glob("*resting*.parquet"))) == 2
     done = check(tmp_path / "resting_c")
     assert done.returncode == 0, done.stdout
     assert "400 ticks" in done.stdout

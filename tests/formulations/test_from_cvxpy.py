@@ -14,7 +14,6 @@ from cvxpy.atoms.sum_squares import sum_squares
 
 import kinqp.codegen.step as step_module
 from kinqp.benchmarks import make_config, sweep
-from kinqp.benchmarks.store import cells_of
 from kinqp.codegen import CompiledStep, CurvatureError, compile_step
 from kinqp.codegen.model import step_code
 from kinqp.codegen.render import render_step
@@ -165,11 +164,10 @@ def test_it_is_swept(tmp_path: Path) -> None:
             "scenarios": ["tests.benchmarks.tiny:tiny"],
             "solvers": ["active-set"],
             "repeats": 1,
-            "warm_up": 2,
         }
     )
     store = sweep(config, tmp_path / "out")
-    qd = {cell.formulation: np.array(store.read(cell)["qd"].to_list()) for cell in cells_of(config)}
+    qd = {cell.formulation: np.array(store.ticks(cell)["qd"].to_list()) for cell in store.manifest.cells}
     assert np.abs(qd[ours]).max() > 1e-4
     np.testing.assert_array_equal(qd[theirs], qd[ours])
 

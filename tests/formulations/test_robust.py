@@ -33,7 +33,7 @@ def ingredients(robot: str, mode: str) -> Callable[..., tuple[Array, float, floa
     """Return (pull, governor, weakness) at (q, v, qd_prev)."""
     tick = Tick(arm(robot), Mode.parse(mode))
     measured = damping(tick)
-    outputs = [ca.densify(pull(tick, measured)), governor(tick, measured), measured.weakness]
+    outputs = [ca.densify(pull(tick, measured)), governor(tick, measured)[0], measured.weakness]
     names = [given.name for given in tick.inputs]
     function = ca.Function("ingredients", [given.symbol for given in tick.inputs], outputs, names, ["p", "g", "w"])
     defaults = {given.name: given.default for given in tick.inputs if given.default is not None}
@@ -60,7 +60,8 @@ def weak_state(robot: str, mode: str, seed: int) -> Array | None:
         sigma = np.linalg.svd(j_bar(robot, mode, q)[0], compute_uv=False)
         _, fixed = rows_at(read, Mode.parse(mode), q)
         locked = np.linalg.svd(fixed, compute_uv=False)[-1] if fixed.size else 1.0
-        if 0.02 < sigma[-1] < 0.08 and (len(sigma) == 1 or sigma[-2] > 3.0 * sigma[-1]) and locked > 0.2:
+        # Within the damping threshold of 0.2, but twenty times what counts as lost, where the way is a compromise.
+        if 0.08 < sigma[-1] < 0.16 and (len(sigma) == 1 or sigma[-2] > 3.0 * sigma[-1]) and locked > 0.2:
             return q
     return None
 
@@ -89,8 +90,8 @@ def test_pull_climbs_the_smallest_singular_value(robot: str, mode: str) -> None:
         assert uphill @ velocity > 0.95 * np.linalg.norm(uphill) * np.linalg.norm(velocity)
         _, fixed = rows_at(arm(robot), Mode.parse(mode), q)
         np.testing.assert_allclose(fixed @ velocity, 0.0, atol=1e-12)
-        # As fast as the hand times the weakness; the same whichever way the hand pulls.
-        assert 0.7 * 0.2 * weakness < np.linalg.norm(velocity) < 1.01 * 0.2 * weakness
+        # Twice as fast as the hand times the weakness; the same whichever way the hand pulls.
+        assert 0.7 * 0.4 * weakness < np.linalg.norm(velocity) < 1.01 * 0.4 * weakness
         np.testing.assert_allclose(ingredients(robot, mode)(q, -0.2 * u)[0] @ uphill, velocity @ uphill, rtol=0.1)
         compared += 1
     assert compared or mode in ("free", "line:z", "fix-position", "plane:1,-2,0.5", "rcm:-0.12", "position")
@@ -151,25 +152,31 @@ def test_side_once_chosen_is_kept_against_noise() -> None:
 
 
 @pytest.mark.parametrize(("robot", "mode"), [("ur5e", "line:z"), ("panda", "rcm:-0.12"), ("lbr_med14", "fix-position")])
-def test_governor_leaves_the_locked_rows_half_the_acceleration(robot: str, mode: str) -> None:
+def test_governor_leaves_enough_acceleration(robot: str, mode: str) -> None:
     rng, read = np.random.default_rng(4), Mode.parse(mode)
     slowed = 0
-    for _ in range(60):
+    for _ in range(300):
         q = arm(robot).random_configuration(rng)
         v = 3.0 * rng.normal(size=read.m_free)
         J_bar, _ = j_bar(robot, mode, q)
         sigma = np.linalg.svd(J_bar, compute_uv=False)[-1]
         _, fixed = rows_at(arm(robot), read, q)
-        if sigma < 0.2 or np.linalg.svd(fixed, compute_uv=False)[-1] < 0.02:
+        if sigma < 0.32 or np.linalg.svd(fixed, compute_uv=False)[-1] < 0.02:
             continue
         share = ingredients(robot, mode)(q, v)[1]
         qd = share * np.linalg.pinv(J_bar) @ v
         h = 1e-5
-        rate = (rows_at(arm(robot), read, q + h * qd)[1] - rows_at(arm(robot), read, q - h * qd)[1]) @ qd / (2.0 * h)
-        needed = np.abs(np.linalg.pinv(fixed) @ rate) / arm(robot).qdd_max
-        assert needed.max() <= 0.5 * (1.0 + 1e-4)
+        after, before = (rows_at(arm(robot), read, q + side * h * qd) for side in (1.0, -1.0))
+        guided, locked = ((one - other) @ qd / (2.0 * h) for one, other in zip(after, before, strict=True))
+        free, _ = rows_at(arm(robot), read, q)
+        keep = np.linalg.pinv(fixed) @ locked
+        shares = [
+            np.abs(qdd / arm(robot).qdd_max).max() / most
+            for qdd, most in ((keep, 0.3), (keep + np.linalg.pinv(J_bar) @ (guided - free @ keep), 1.0))
+        ]
+        assert max(shares) <= 1.0 + 1e-4
         if share < 1.0:
-            assert needed.max() == pytest.approx(0.5, rel=1e-3)
+            assert max(shares) == pytest.approx(1.0, rel=1e-3)
             slowed += 1
     assert slowed > 5
 

@@ -1,0 +1,216 @@
+"""The timing part: a block's recorded problems solved again and again by all its cells, visits in random order."""
+
+from __future__ import annotations
+
+import gc
+from contextlib import contextmanager
+from time import perf_counter
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+import polars as pl
+
+from .cells import solver_of
+from .problems import Window
+from .store import Part
+from .timing_c import c_replay
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..solvers import QP, Solution
+    from .cells import Cell
+    from .config import SweepConfig
+    from .problems import Problems
+
+    Array = NDArray[np.float64]
+
+_NO_C: Final = "c is null: no C of this solver is replayed"
+# How often a few ticks are tried to see how long they take.
+_TRIALS: Final = 3
+_NO_OWN: Final = "own is null: the solver has no timer of its own"
+
+
+class TimedCell:
+    """A solver that visits recorded problems.
+
+    Parameters
+    ----------
+    cell : Cell
+    problems : Problems
+        The block's.
+    config : SweepConfig
+    """
+
+    def __init__(self, cell: Cell, problems: Problems, config: SweepConfig) -> None:
+        self.cell: Final = cell
+        self._problems: Final = problems
+        self._solver: Final = solver_of(cell)
+        self._c: Final = c_replay(self._solver)
+        self._frames: Final[list[pl.DataFrame]] = []
+        self._first: list[Array] | None = None
+        self._deterministic = True
+        self._windows: Final = self._affordable(config.timing_budget / config.repeats)
+        self._sequence: Final = [qp for window in self._windows for qp in self._qps(window)]
+        self._fresh: Final = _fresh(self._windows, problems.qps)
+
+    def visit(self, repeat: int) -> None:
+        """Solve all problems once, and keep the times."""
+        rows = _no_rows()
+        answers: list[Array] = []
+        for window in self._windows:
+            self._window(window, rows, answers)
+        times = self._c.seconds(self._sequence, self._fresh) if self._c is not None else None
+        frame = pl.DataFrame(rows, schema={"tick": pl.Int64} | dict.fromkeys(list(rows)[1:], pl.Float64))
+        c = [None] * len(frame) if times is None else _per_tick(times, self._windows, self._problems.qps)
+        self._frames.append(
+            frame.with_columns(pl.lit(repeat, dtype=pl.Int64).alias("repeat"), pl.Series("c", c, dtype=pl.Float64))
+        )
+        if self._first is None:
+            self._first = answers
+        self._deterministic &= all(
+            np.array_equal(a, b, equal_nan=True) for a, b in zip(self._first, answers, strict=True)
+        )
+
+    def result(self) -> tuple[pl.DataFrame, Part]:
+        """All times, one tick of one repeat per row, and how the cell ended.
+
+        Columns: `tick`, `repeat`; `wall_setup` of a window's first tick, `wall_update` of all others (null for the
+        other kind); `wall_solve`; `own`, the solver's own timer; `c`, the solve in C; all [s].
+        """
+        frame = pl.concat(self._frames).select("tick", "repeat", "wall_setup", "wall_update", "wall_solve", "own", "c")
+        notes = [text for name, text in (("own", _NO_OWN), ("c", _NO_C)) if frame[name].null_count() == len(frame)]
+        ticks = sum(len(window.ticks) for window in self._windows)
+        part = Part("done", "", "replay", ticks, len(self._frames), self._deterministic, tuple(notes))
+        return frame, part
+
+    def _window(self, window: Window, rows: dict[str, list[float | int | None]], answers: list[Array]) -> None:
+        solver = self._solver
+        solver.reset()
+        for index, tick in enumerate((window.lead, *window.ticks)):
+            solutions = [solver.solve(qp) for qp in self._problems.qps[tick]]
+            answers += [solution.x for solution in solutions]
+            setup = sum(solution.setup_time for solution in solutions)
+            rows["tick"].append(tick)
+            rows["wall_setup"].append(setup if index == 0 else None)
+            rows["wall_update"].append(None if index == 0 else setup)
+            rows["wall_solve"].append(sum(solution.solve_time for solution in solutions))
+            rows["own"].append(_own(solutions))
+
+    def _affordable(self, budget: float) -> tuple[Window, ...]:
+        """Windows, from the first, that one visit has time for [s]: at least one tick."""
+        first = self._problems.windows[0]
+        # The first call of all may import, build and allocate.
+        self._solver.solve(self._problems.qps[first.lead][0])
+        short = Window(first.lead, first.ticks[:3])
+        taken: list[float] = []
+        # The best of a few, since others on the machine make it longer; of one, where that alone is too long.
+        while len(taken) < _TRIALS and sum(taken) < budget:
+            start = perf_counter()
+            self._window(short, _no_rows(), [])
+            taken.append(perf_counter() - start)
+        each = min(taken) / (1 + len(short.ticks))
+        windows: list[Window] = []
+        for window in self._problems.windows:
+            ticks = window.ticks[: max(int(budget / each) - 1, 0)]
+            budget -= each * (1 + len(ticks))
+            if not ticks:
+                break
+            windows.append(Window(window.lead, ticks))
+        return tuple(windows) or (Window(first.lead, first.ticks[:1]),)
+
+    def _qps(self, window: Window) -> list[QP]:
+        return [qp for tick in (window.lead, *window.ticks) for qp in self._problems.qps[tick]]
+
+
+def _no_rows() -> dict[str, list[float | int | None]]:
+    return {name: [] for name in ("tick", "wall_setup", "wall_update", "wall_solve", "own")}
+
+
+def time_block(
+    problems: Problems,
+    cells: Sequence[Cell],
+    config: SweepConfig,
+    on_visit: Callable[[Cell, int], None],
+    on_failure: Callable[[Cell, str], None],
+) -> Iterator[tuple[Cell, pl.DataFrame, Part]]:
+    """Time a block's cells beside each other.
+
+    Every repeat visits all cells in a new random order, so that a machine that slows down or speeds up does so for all
+    of them. To be called in a process that has nothing else to do.
+
+    Parameters
+    ----------
+    problems : Problems
+        The block's.
+    cells : sequence of Cell
+        Of the block.
+    config : SweepConfig
+    on_visit : callable
+        Called with a cell and the number of the repeat before each visit; -1: before it is made ready.
+    on_failure : callable
+        Called with a cell that raised and what it said; it is not visited again.
+
+    Yields
+    ------
+    tuple of Cell, pl.DataFrame, Part
+        As `TimedCell.result` has them, when all are done.
+    """
+    timed: dict[Cell, TimedCell] = {}
+    rng = np.random.default_rng(config.seed)
+    with _no_garbage_collection():
+        for repeat in range(-1, config.repeats):
+            for index in rng.permutation(len(cells)):
+                cell = cells[index]
+                if repeat >= 0 and cell not in timed:
+                    continue
+                on_visit(cell, repeat)
+                try:
+                    if repeat < 0:
+                        timed[cell] = TimedCell(cell, problems, config)
+                    else:
+                        timed[cell].visit(repeat)
+                except Exception as error:  # noqa: BLE001  # whatever a solver raises ends this cell, not the others
+                    timed.pop(cell, None)
+                    on_failure(cell, f"{type(error).__name__}: {error}")
+    for cell, one in timed.items():
+        yield cell, *one.result()
+
+
+def _fresh(windows: Sequence[Window], qps: dict[int, tuple[QP, ...]]) -> list[bool]:
+    """Where a solver sets up anew: at the beginning of a window, and where the structure changes."""
+    fresh: list[bool] = []
+    for window in windows:
+        last: object = None
+        for tick in (window.lead, *window.ticks):
+            for qp in qps[tick]:
+                fresh.append(qp.structure != last)
+                last = qp.structure
+    return fresh
+
+
+def _per_tick(times: Array, windows: Sequence[Window], qps: dict[int, tuple[QP, ...]]) -> list[float]:
+    """Add up the levels of each tick."""
+    counts = [len(qps[tick]) for window in windows for tick in (window.lead, *window.ticks)]
+    starts = np.cumsum([0, *counts[:-1]])
+    return [float(total) for total in np.add.reduceat(times, starts)]
+
+
+def _own(solutions: Sequence[Solution]) -> float | None:
+    own = [solution.own_time for solution in solutions]
+    return None if any(time is None for time in own) else float(sum(time for time in own if time is not None))
+
+
+@contextmanager
+def _no_garbage_collection() -> Iterator[None]:
+    """Keep the interpreter's garbage collector out of the timed span; it would strike single ticks at random."""
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
