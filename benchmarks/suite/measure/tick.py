@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from kinqp.codegen.model import identifier, step_code
+from kinqp.codegen.fields import identifier
+from kinqp.codegen.model import step_code
 from kinqp.codegen.render import render_batch, render_step
 from kinqp.codegen.step import STEP_FLAGS
 from kinqp.formulations import Mode, get_formulation
@@ -70,7 +71,7 @@ class TimedTick:
         code = step_code(robot, get_formulation(formulation), [Mode.parse(mode)], prefix)
         sources = render_step(code)
         source = sources.pop(f"{prefix}.c")
-        sources["step.inc"] = instrumented(source, [array.partition("[")[0] for array in code.modes[0].arrays])
+        sources["step.inc"] = instrumented(source, [array.partition("[")[0] for array in code.single[0].arrays])
         sources["batch.inc"] = render_batch(code)
         sources["timing.c"] = (files(__package__) / "timing.c").read_text(encoding="utf-8")
         library = build_library(
