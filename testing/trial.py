@@ -84,7 +84,7 @@ class Trial:
 
     @cached_property
     def time_ratio(self) -> float:
-        """Median over the states of this one's time over that of `cartesian-error` by `active-set`, both interpreted."""
+        """Median over the states of this one's time over that of the reference by `active-set`, both interpreted."""
         mine, other = self._step, make_step(load_robot(self.robot), self.reference, self.mode, solver="active-set")
         best = np.full((2, self.ticks), np.inf)
         for _ in range(_REPEATS):
