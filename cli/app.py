@@ -26,6 +26,7 @@ from ..benchmarks import (
     sweep,
     sweep_table,
 )
+from ..benchmarks.worst_case import CaseError
 from ..codegen import CurvatureError, ExportError, export_c
 from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
@@ -35,12 +36,14 @@ from ..solvers.plugins import PluginError
 from .davinci import run_davinci
 from .interrupt import interruptible
 from .report import run_compare, run_report
+from .worst_case import run_worst_case
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 # What a user can get wrong. Anything else is a mistake of ours and deserves its traceback.
 USER_ERRORS = (
+    CaseError,
     ClusterError,
     CompareError,
     CompilerError,
@@ -71,6 +74,7 @@ app = typer.Typer(
 app.command("report")(run_report)
 app.command("compare")(run_compare)
 app.command("davinci")(run_davinci)
+app.command("worst-case")(run_worst_case)
 
 
 @app.command("list")

@@ -1,0 +1,196 @@
+"""What a search found, as a file that shows it again: every number to the last bit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from ...codegen import compile_step
+from ...robots import load_robot
+from ..conditions import conditions
+from .states import Batch, Draws
+from .timing import Stopwatch
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from ...codegen import CompiledStep
+
+_KIND: Final = "kinqp worst case"
+# Typical ticks that a replayed time is compared with.
+_TYPICAL: Final = 50
+
+
+class CaseError(ValueError):
+    """A file isn't a worst case that can be shown again; the message names the file and what was expected."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A state, and what its tick took.
+
+    Attributes
+    ----------
+    q, v, qd_prev : list of float
+        [rad or m], [m/s, rad/s], [rad/s or m/s]; `qd_prev` counts where the formulation takes it.
+    limits : dict of str to list of float
+        Run-time inputs in place of the robot's own limits.
+    iterations : int
+    status : str
+    active : list of str
+        Rows that hold the command back, by name.
+    seconds : float
+        Of a tick, where and when it was found [s].
+    """
+
+    q: list[float]
+    v: list[float]
+    qd_prev: list[float]
+    limits: dict[str, list[float]]
+    iterations: int
+    status: str
+    active: list[str]
+    seconds: float
+
+    @classmethod
+    def of(cls, step: CompiledStep, state: Batch, seconds: float) -> Found:
+        """Describe a state, a batch of one."""
+        inputs = {**state.limits, **({"qd_prev": state.qd_prev[0]} if "qd_prev" in step.inputs else {})}
+        result = step(state.q[0], state.v[0], **inputs)
+        return cls(
+            state.q[0].tolist(),
+            state.v[0].tolist(),
+            state.qd_prev[0].tolist(),
+            {name: np.asarray(values).tolist() for name, values in state.limits.items()},
+            result.iterations,
+            result.status.value,
+            list(result.active),
+            seconds,
+        )
+
+    def state(self) -> Batch:
+        """Give the state, as a batch of one."""
+        limits = {name: np.array(values) for name, values in self.limits.items()}
+        return Batch(np.array([self.q]), np.array([self.v]), np.array([self.qd_prev]), limits)
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """What a search found.
+
+    Attributes
+    ----------
+    robot, formulation, mode : str
+        As given by name.
+    tip : str or None
+        Frame at the tool centre point, where the robot is a URDF that branches.
+    most : Found
+        The state with most iterations.
+    slowest : Found
+        The one whose tick takes longest.
+    median : float
+        Time of a typical tick, in the same run [s].
+    statuses : dict of str to int
+        How the ticks of the search ended.
+    ticks, seed : int
+        Of the search.
+    conditions : dict of str to str
+        Machine and versions.
+    """
+
+    robot: str
+    tip: str | None
+    formulation: str
+    mode: str
+    most: Found
+    slowest: Found
+    median: float
+    statuses: dict[str, int]
+    ticks: int
+    seed: int
+    conditions: dict[str, str]
+
+    @classmethod
+    def of(
+        cls,
+        step: CompiledStep,
+        *,
+        most: Found,
+        slowest: Found,
+        median: float,
+        statuses: dict[str, int],
+        ticks: int,
+        seed: int,
+        robot: str | None = None,
+        tip: str | None = None,
+        formulation: str | None = None,
+    ) -> WorstCase:
+        """Put a search's results together; names that are not given are those of the objects."""
+        return cls(
+            robot or step.robot.name,
+            tip,
+            formulation or step.formulation.name,
+            str(step.mode),
+            most,
+            slowest,
+            median,
+            statuses,
+            ticks,
+            seed,
+            conditions(),
+        )
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What a case takes here and now.
+
+    Attributes
+    ----------
+    most, slowest : Found
+    median : float
+        Time of a typical tick [s].
+    """
+
+    most: Found
+    slowest: Found
+    median: float
+
+
+def write_case(case: WorstCase, path: Path) -> None:
+    """Write a case as JSON, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.partial")
+    partial.write_text(json.dumps({"kind": _KIND, **asdict(case)}, indent=1) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def read_case(path: Path) -> WorstCase:
+    """Read a case.
+
+    Raises
+    ------
+    CaseError
+        Naming the file, when it isn't one.
+    """
+    try:
+        given: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if given.pop("kind") != _KIND:
+            raise CaseError(f"{path}: expected a file that kinqp worst-case has written")
+        return WorstCase(**{**given, "most": Found(**given["most"]), "slowest": Found(**given["slowest"])})
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise CaseError(f"{path}: expected a file that kinqp worst-case has written: {error}") from error
+
+
+def replay(case: WorstCase) -> Replayed:
+    """Compile the case's step and run its two states again, and typical ones to compare their time with."""
+    step = compile_step(load_robot(case.robot, tip=case.tip), case.formulation, case.mode)
+    typical = Draws(step, np.random.default_rng(case.seed)).anywhere(_TYPICAL, {})
+    states = [case.most.state(), case.slowest.state(), *(typical.pick(index) for index in range(len(typical)))]
+    seconds = Stopwatch(step, case.seed).seconds(states)
+    return Replayed(
+        Found.of(step, states[0], seconds[0]), Found.of(step, states[1], seconds[1]), float(np.median(seconds[2:]))
+    )
