@@ -5,7 +5,7 @@ For a fixed M = J# the QP of `cartesian-error` has data that are linear in theta
 is dropped) iterate and multipliers of the dual method of Goldfarb and Idnani are linear in theta too, and so is every
 comparison that decides: the thetas of a path are a polyhedral cone. A linear program says whether it has an inside.
 The method is that of Arnstrom and Axehill (IEEE TAC 67(6), 2022) for parametric QPs, for our own rule of entering.
-Paths multiply fast: seconds for one direction or a few rows, more than minutes for three directions of a seven-axis arm.
+Paths multiply fast: seconds for one direction or a few rows; three directions of a seven-axis arm are out of reach.
 """
 
 from __future__ import annotations
