@@ -6,7 +6,7 @@ OUT ?= results
 BIN := $(VENV)/bin
 # One worker per core, a file stays with one worker; pytest-benchmark has no place beside others.
 PARALLEL := -n auto --dist loadfile -p no:benchmark
-FOLDERS := robots solvers formulations codegen baselines control benchmarks cli configs
+FOLDERS := robots solvers formulations codegen baselines control benchmarks cli configs testing
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
 .PHONY: help bench perf test test-long test-arm browser lint format types clean
