@@ -67,7 +67,7 @@ def render_step(code: StepCode) -> dict[str, str]:
         "rows": code.rows,
         "max_iterations": code.max_iterations,
         "brake": code.brake_body,
-        # Where equalities hold the locked rows the solver keeps them; where a pseudo-inverse does, rounding grows with v.
+        # Equalities are kept by the solver; what a pseudo-inverse leaves in the locked rows grows with the hand.
         "checked": [mode for mode in code.single if mode.m_fixed and not mode.m_eq],
         "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
     }
