@@ -159,7 +159,7 @@ def instrumented(source: str, targets: Sequence[str]) -> str:
     # what brings its answer back to x.
     sines = r"    KINQP_MARK(2, 1);\n\g<0>    KINQP_HOLD(sine); KINQP_HOLD(cosine); KINQP_MARK(2, 2);\n"
     places = (
-        (r"^    kinqp_sincos\(\d.*\n", sines),
+        (r"^    kinqp_sincos\(\d+, in->q.*\n", sines),
         (r"^    int outside = 0;\n", rf"   {hold} KINQP_MARK(1, 3);\n\g<0>"),
         (r"^    /\* (?:Without rows the answer|The minimiser without rows).*\n", r"    KINQP_MARK(2, 4);\n\g<0>"),
         (r"^    if \(outside\) \{\n", r"    KINQP_MARK(2, 5);\n\g<0>"),
