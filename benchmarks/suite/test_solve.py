@@ -12,6 +12,8 @@ from kinqp.solvers import QP, available_solvers, get_solver
 from measure.states import MODE, arm, near_limits
 
 ROUNDS = 200
+# How fast the arm moved before, for formulations that ask: shares of its joints' limits, at random.
+MOVING = 0.2
 
 
 def single_level():
@@ -23,7 +25,11 @@ def single_level():
 def problems(formulation: str) -> tuple[QP, ...]:
     states = near_limits(ROUNDS)
     step = make_step(arm(), formulation, MODE)
-    return tuple(step.evaluate(q, v).qp for q, v in zip(states.q, states.v, strict=True))
+    commands = np.random.default_rng(0).uniform(-MOVING, MOVING, states.q.shape) * arm().qd_max
+    return tuple(
+        step.evaluate(q, v, **({"qd_prev": qd_prev} if "qd_prev" in step.inputs else {})).qp
+        for q, v, qd_prev in zip(states.q, states.v, commands, strict=True)
+    )
 
 
 @pytest.mark.parametrize("solver", available_solvers())
