@@ -11,7 +11,7 @@ from .registry import available_baselines, get_baseline, is_baseline
 from .saturation import Level
 from .saturation_null_space import SaturationNullSpace, saturate_tasks
 from .situation import Situation
-from .step import BaselineStep, NoSolver, Tolerances
+from .step import BaselineStep, NoSolver
 from .task_augmentation import TaskAugmentation
 from .task_priority import TaskPriority
 from .weighted_least_norm import WeightedLeastNorm
@@ -34,7 +34,6 @@ __all__ = [
     "Situation",
     "TaskAugmentation",
     "TaskPriority",
-    "Tolerances",
     "WeightedLeastNorm",
     "available_baselines",
     "get_baseline",

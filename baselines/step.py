@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from ..formulations import StepResult
+from ..formulations import Kept, StepResult, one_by_one
 from ..solvers import Status
 from .situation import Observer
 
@@ -21,15 +21,6 @@ if TYPE_CHECKING:
     from .situation import Situation
 
     Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Tolerances:
-    """What counts as held; see the constants of the same names in `kinqp.control`."""
-
-    bound: float
-    fixed: float
-    fixed_floor: float
 
 
 @dataclass(frozen=True)
@@ -57,12 +48,11 @@ class BaselineStep:
     Not to be shared between threads.
     """
 
-    def __init__(self, robot: Robot, baseline: Baseline, mode: Mode, tolerances: Tolerances) -> None:
+    def __init__(self, robot: Robot, baseline: Baseline, mode: Mode) -> None:
         self.robot: Final = robot
         self.mode: Final = mode
         self.baseline: Final = baseline
         self.solver: Final = NoSolver()
-        self._tolerances: Final = tolerances
         self._observe: Final = Observer(baseline, robot, mode)
 
     @property
@@ -108,25 +98,14 @@ class BaselineStep:
         **inputs : array_like
             As in a call, the same for all states.
         """
-        states, twists = np.asarray(Q, dtype=float), np.asarray(V, dtype=float)
-        if states.ndim != 2 or twists.ndim != 2 or len(states) != len(twists):
-            raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
-        return [self(q, v, **inputs) for q, v in zip(states, twists, strict=True)]
+        return one_by_one(self, Q, V, inputs)
 
     def _judge(self, at: Situation, resolved: Resolved, time: float) -> StepResult:
         qd = resolved.qd
         finite = bool(np.isfinite(qd).all())
-        fixed_error = bound_violation = np.inf
-        off: dict[Promise, str] = {}
-        if finite:
-            residual = np.abs(at.J_fixed @ qd - at.v_fixed)
-            share = np.abs(at.J_fixed) @ np.abs(qd) + np.abs(at.v_fixed)
-            fixed_error = float(np.max(residual, initial=0.0))
-            bound_violation = float(np.max(at.over(qd).clip(min=0.0)))
-            if bound_violation > self._tolerances.bound:
-                off["joint bounds"] = f"a joint exceeds its velocity bound by {bound_violation:.1e}"
-            if np.any(residual > self._tolerances.fixed * np.maximum(share, self._tolerances.fixed_floor)):
-                off["locked rows"] = f"a locked row is off by {fixed_error:.1e}"
+        kept = Kept.of(qd, at.J_fixed, at.v_fixed, at.qd_lo, at.qd_hi)
+        found: dict[Promise, str] = {"joint bounds": kept.joint_bounds, "locked rows": kept.locked_rows}
+        off = {promise: text for promise, text in found.items() if text}
         broken = [text for promise, text in off.items() if promise in self.baseline.promises]
         solved = finite and not broken
         if solved:
@@ -140,8 +119,8 @@ class BaselineStep:
             status=Status.SOLVED if solved else Status.INACCURATE,
             iterations=resolved.iterations,
             active=resolved.active if solved else (),
-            fixed_error=fixed_error,
-            bound_violation=bound_violation,
+            fixed_error=kept.fixed_error,
+            bound_violation=kept.bound_violation,
             sigma_min=at.sigma_min(),
             setup_time=0.0,
             solve_time=time,

@@ -7,8 +7,19 @@ from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
-from ..baselines import Baseline, BaselineStep, Tolerances, get_baseline, is_baseline
-from ..formulations import ABOVE, Evaluator, InputError, Mode, StepResult, get_formulation, levels_of, lower
+from ..baselines import Baseline, BaselineStep, get_baseline, is_baseline
+from ..formulations import (
+    ABOVE,
+    Evaluator,
+    InputError,
+    Kept,
+    Mode,
+    StepResult,
+    get_formulation,
+    levels_of,
+    lower,
+    one_by_one,
+)
 from ..solvers import PluginError, Status, get_solver
 
 if TYPE_CHECKING:
@@ -19,14 +30,6 @@ if TYPE_CHECKING:
     from ..solvers import Solution, Solver
 
     Array = NDArray[np.float64]
-
-# What the application promises of the locked rows, relative to the speed they compensate [-].
-FIXED_TOLERANCE: Final = 1e-9
-# Where less than this is compensated in a locked row, it is judged absolutely [m/s, rad/s].
-FIXED_FLOOR: Final = 1.0
-# What a joint velocity may exceed its bounds by [rad/s or m/s]: a thousandth of the encoder noise of a good arm over
-# 1 ms, and above the primal tolerance of an interior-point solver asked for 1e-9.
-BOUND_TOLERANCE: Final = 1e-8
 
 
 class InterpretedStep:
@@ -117,10 +120,7 @@ class InterpretedStep:
         **inputs : array_like
             As in a call, the same for all states.
         """
-        states, twists = np.asarray(Q, dtype=float), np.asarray(V, dtype=float)
-        if states.ndim != 2 or twists.ndim != 2 or len(states) != len(twists):
-            raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
-        return [self(q, v, **inputs) for q, v in zip(states, twists, strict=True)]
+        return one_by_one(self, Q, V, inputs)
 
     def _given(self, level: Evaluator, inputs: dict[str, ArrayLike]) -> dict[str, ArrayLike]:
         """Those of the inputs that a level takes."""
@@ -138,19 +138,10 @@ class InterpretedStep:
         if status is not Status.SOLVED and len(self._levels) > 1:
             message = f"{self._levels[len(levels) - 1].lowered.formulation.name}: {message}"
         qd = _command(instance, solution)
-        fixed_error = bound_violation = np.inf
-        if np.isfinite(qd).all():
-            residual = np.abs(instance.J_fixed @ qd - instance.v_fixed)
-            share = np.abs(instance.J_fixed) @ np.abs(qd) + np.abs(instance.v_fixed)
-            fixed_error = float(np.max(residual, initial=0.0))
-            excess = np.maximum(qd - instance.qd_hi, instance.qd_lo - qd)
-            bound_violation = float(np.max(excess, initial=0.0))
-            if status is Status.SOLVED and bound_violation > BOUND_TOLERANCE:
-                status, message = Status.INACCURATE, f"a joint exceeds its velocity bound by {bound_violation:.1e}"
-            if status is Status.SOLVED and np.any(residual > FIXED_TOLERANCE * np.maximum(share, FIXED_FLOOR)):
-                status, message = Status.INACCURATE, f"a locked row is off by {fixed_error:.1e}"
-        elif status is Status.SOLVED:
-            status, message = Status.INACCURATE, "the command is not finite"
+        kept = Kept.of(qd, instance.J_fixed, instance.v_fixed, instance.qd_lo, instance.qd_hi)
+        off = (kept.joint_bounds or kept.locked_rows) if np.isfinite(qd).all() else "the command is not finite"
+        if status is Status.SOLVED and off:
+            status, message = Status.INACCURATE, off
         solved = status is Status.SOLVED
         command = qd if solved else instance.stop
         return StepResult(
@@ -159,8 +150,8 @@ class InterpretedStep:
             status=status,
             iterations=sum(each.iterations for _, each in levels),
             active=active if solved else (),
-            fixed_error=fixed_error,
-            bound_violation=bound_violation,
+            fixed_error=kept.fixed_error,
+            bound_violation=kept.bound_violation,
             sigma_min=_smallest_singular_value(instance.J_bar),
             setup_time=sum(each.setup_time for _, each in levels),
             solve_time=sum(each.solve_time for _, each in levels),
@@ -232,6 +223,5 @@ def make_step(
     if isinstance(formulation, Baseline) or (isinstance(formulation, str) and is_baseline(formulation)):
         if options:
             raise PluginError(f"baseline {formulation}: expected no options of a solver, got {', '.join(options)}")
-        tolerances = Tolerances(bound=BOUND_TOLERANCE, fixed=FIXED_TOLERANCE, fixed_floor=FIXED_FLOOR)
-        return BaselineStep(robot, get_baseline(formulation), parsed, tolerances)
+        return BaselineStep(robot, get_baseline(formulation), parsed)
     return InterpretedStep(robot, get_formulation(formulation), parsed, get_solver(solver, **options))

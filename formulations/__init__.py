@@ -19,6 +19,7 @@ from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
 from .joint_space_acceleration import JointSpaceAcceleration
 from .joint_space_robust import JointSpaceRobust
 from .joint_space_weighted import JointSpaceWeighted, limit_gradient
+from .kept import BOUND_TOLERANCE, FIXED_TOLERANCE, Kept
 from .lowering import DATA, Lowered, RowNames, lower
 from .minimum_acceleration_norm import MinimumAccelerationNorm
 from .minimum_kinetic_energy import MinimumKineticEnergy
@@ -27,7 +28,7 @@ from .minimum_velocity_norm import MinimumVelocityNorm
 from .modes import MODE_NAMES, Mode, ModeError
 from .program import DeclarationError, QuadraticProgram
 from .registry import available_formulations, get_formulation, with_constraints
-from .result import StepResult
+from .result import StepResult, one_by_one
 from .spy import PlotError
 from .task_scaling import TaskScaling
 from .tick import DEFAULT_DT, Input, Tick
@@ -35,11 +36,13 @@ from .tick import DEFAULT_DT, Input, Tick
 __all__ = [
     "ABOVE",
     "BOUNDS",
+    "BOUND_TOLERANCE",
     "DATA",
     "DEFAULT_DAMPING",
     "DEFAULT_DT",
     "DEFAULT_JOINT_WEIGHT",
     "DEFAULT_TIME_CONSTANT",
+    "FIXED_TOLERANCE",
     "MODE_NAMES",
     "CartesianError",
     "CartesianErrorAcceleration",
@@ -58,6 +61,7 @@ __all__ = [
     "JointSpaceAcceleration",
     "JointSpaceRobust",
     "JointSpaceWeighted",
+    "Kept",
     "Lowered",
     "MinimumAccelerationNorm",
     "MinimumKineticEnergy",
@@ -83,6 +87,7 @@ __all__ = [
     "levels_of",
     "limit_gradient",
     "lower",
+    "one_by_one",
     "robust_inverse",
     "thesis_bound",
     "velocity_bounds",

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
 
     from ..solvers import Status
 
@@ -55,3 +58,19 @@ class StepResult:
     setup_time: float
     solve_time: float
     message: str
+
+
+def one_by_one(
+    step: Callable[..., StepResult], Q: ArrayLike, V: ArrayLike, inputs: dict[str, ArrayLike]
+) -> list[StepResult]:
+    """Call a step for each of the states Q, shape (N, nv), and hands V, shape (N, m_free); the same inputs for all.
+
+    Raises
+    ------
+    ValueError
+        When Q and V have not as many rows.
+    """
+    states, twists = np.asarray(Q, dtype=float), np.asarray(V, dtype=float)
+    if states.ndim != 2 or twists.ndim != 2 or len(states) != len(twists):
+        raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
+    return [step(q, v, **inputs) for q, v in zip(states, twists, strict=True)]
