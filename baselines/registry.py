@@ -59,11 +59,7 @@ def get_baseline(baseline: str | Baseline, /, **options: object) -> Baseline:
     PluginError
         When there is none of that name, or options come with an instance.
     """
-    if isinstance(baseline, str):
-        return _REGISTRY.make(baseline, **options)
-    if options:
-        raise PluginError(f"baseline: expected no options with an instance, got {', '.join(options)}")
-    return baseline
+    return _REGISTRY.get(baseline, **options)
 
 
 def is_baseline(text: str) -> bool:

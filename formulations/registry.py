@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from ..solvers.plugins import PluginError, Registry
+from ..solvers.plugins import Registry
 from .base import Formulation
 from .cartesian_error import CartesianError
 from .cartesian_error_acceleration import CartesianErrorAcceleration
@@ -79,13 +79,11 @@ def get_formulation(formulation: str | Formulation, /, **options: object) -> For
     PluginError
         When there is none of that name, or options come with an instance.
     """
-    if isinstance(formulation, str):
-        name, *constraints = _BETWEEN.split(formulation)
-        made = _REGISTRY.make(name, **options)
-        return with_constraints(made, constraints) if constraints else made
-    if options:
-        raise PluginError(f"formulation: expected no options with an instance, got {', '.join(options)}")
-    return formulation
+    if not isinstance(formulation, str):
+        return _REGISTRY.get(formulation, **options)
+    name, *constraints = _BETWEEN.split(formulation)
+    made = _REGISTRY.make(name, **options)
+    return with_constraints(made, constraints) if constraints else made
 
 
 def with_constraints(formulation: str | Formulation, constraints: Sequence[str | Constraint]) -> Constrained:

@@ -100,6 +100,22 @@ class Registry(Generic[T]):
             raise PluginError(f"{self.kind} {name!r}: expected a {self.base.__name__}, got {made!r}")
         return made
 
+    def get(self, given: str | T, /, **options: object) -> T:
+        """Make a plug-in from its name, see `make`; an instance is returned as it is.
+
+        Raises
+        ------
+        PluginError
+            As in `make`, or when options come with an instance.
+        UnknownOptionError
+            As in `make`.
+        """
+        if isinstance(given, str):
+            return self.make(given, **options)
+        if options:
+            raise PluginError(f"{self.kind}: expected no options with an instance, got {', '.join(options)}")
+        return given
+
 
 def parse_spec(kind: str, spec: str) -> tuple[str, dict[str, object]]:
     """Split ``name(key=value, ...)`` into the name and the options; numbers become numbers, all else stays text."""

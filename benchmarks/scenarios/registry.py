@@ -46,4 +46,4 @@ def get_scenario(scenario: str | Scenario) -> Scenario:
     PluginError
         When there is none of that name.
     """
-    return _REGISTRY.make(scenario) if isinstance(scenario, str) else scenario
+    return _REGISTRY.get(scenario)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from ...solvers.plugins import PluginError, Registry
+from ...solvers.plugins import Registry
 from .base import Constraint
 from .contact_force import ContactForce
 from .elbow import ElbowBend, ElbowHold, ElbowRange
@@ -56,8 +56,4 @@ def get_constraint(constraint: str | Constraint, /, **options: object) -> Constr
     PluginError
         When there is none of that name, or options come with an instance.
     """
-    if isinstance(constraint, str):
-        return _REGISTRY.make(constraint, **options)
-    if options:
-        raise PluginError(f"constraint: expected no options with an instance, got {', '.join(options)}")
-    return constraint
+    return _REGISTRY.get(constraint, **options)
