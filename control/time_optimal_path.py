@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .trajectories import JointTrajectory, _limits
+from .trajectories import JointTrajectory, checked_job
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -56,12 +56,7 @@ def time_optimal_path(points: ArrayLike, qd_max: ArrayLike, qdd_max: ArrayLike, 
     """
     from scipy.interpolate import PchipInterpolator
 
-    way = np.asarray(points, dtype=float)
-    if way.ndim != 2 or not np.isfinite(way).all():
-        raise ValueError(f"points: expected rows of finite joint positions, got shape {way.shape}")
-    if not 0.0 < dt < np.inf:
-        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
-    speed, acceleration = _limits(qd_max, qdd_max, way.shape[1])
+    way, speed, acceleration = checked_job(points, qd_max, qdd_max, dt)
     # Parameter: the time that the slowest joint needs at full speed; ds/dt is then about 1 at most.
     lengths = np.max(np.abs(np.diff(way, axis=0)) / speed, axis=1, initial=0.0)
     way = way[np.concatenate([[True], lengths > 0.0])]

@@ -149,13 +149,8 @@ def time_optimal_stop_and_go(
     ValueError
         When an input has the wrong shape or is out of range, or Ruckig finds no move.
     """
-    way = np.asarray(points, dtype=float)
-    if way.ndim != 2 or len(way) < 2 or not np.isfinite(way).all():
-        raise ValueError(f"points: expected at least 2 rows of finite joint positions, got shape {way.shape}")
-    if not 0.0 < dt < np.inf:
-        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+    way, speed, acceleration = checked_job(points, qd_max, qdd_max, dt)
     nv = way.shape[1]
-    speed, acceleration = _limits(qd_max, qdd_max, nv)
     planner, moves = ruckig.Ruckig(nv), []
     for begin, end in pairwise(way):
         asked = ruckig.InputParameter(nv)
@@ -176,6 +171,22 @@ def time_optimal_stop_and_go(
     samples = [moves[i].at_time(float(t - begins[i]))[:3] for i, t in zip(number, times, strict=True)]
     q, qd, qdd = (np.array(column) for column in zip(*samples, strict=True))
     return JointTrajectory(t=times, q=q, qd=qd, qdd=qdd)
+
+
+def checked_job(points: ArrayLike, qd_max: ArrayLike, qdd_max: ArrayLike, dt: float) -> tuple[Array, Array, Array]:
+    """Return points and limits of a time-optimal motion, shapes (N, nv) and (nv,), or name what can't be used.
+
+    Raises
+    ------
+    ValueError
+        When an input has the wrong shape or is out of range.
+    """
+    way = np.asarray(points, dtype=float)
+    if way.ndim != 2 or len(way) < 2 or not np.isfinite(way).all():
+        raise ValueError(f"points: expected at least 2 rows of finite joint positions, got shape {way.shape}")
+    if not 0.0 < dt < np.inf:
+        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+    return way, *_limits(qd_max, qdd_max, way.shape[1])
 
 
 def _limits(qd_max: ArrayLike, qdd_max: ArrayLike, nv: int) -> tuple[Array, Array]:
