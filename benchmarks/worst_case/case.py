@@ -10,7 +10,6 @@ import numpy as np
 
 from ...codegen import compile_step
 from ...robots import load_robot
-from ..conditions import conditions
 from .states import Batch, Draws
 from .timing import Stopwatch
 
@@ -112,36 +111,6 @@ class WorstCase:
     ticks: int
     seed: int
     conditions: dict[str, str]
-
-    @classmethod
-    def of(
-        cls,
-        step: CompiledStep,
-        *,
-        most: Found,
-        slowest: Found,
-        median: float,
-        statuses: dict[str, int],
-        ticks: int,
-        seed: int,
-        robot: str | None = None,
-        tip: str | None = None,
-        formulation: str | None = None,
-    ) -> WorstCase:
-        """Put a search's results together; names that are not given are those of the objects."""
-        return cls(
-            robot or step.robot.name,
-            tip,
-            formulation or step.formulation.name,
-            str(step.mode),
-            most,
-            slowest,
-            median,
-            statuses,
-            ticks,
-            seed,
-            conditions(),
-        )
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ...solvers.active_set import STATUSES
+from ..conditions import conditions
 from .case import Found, WorstCase
 from .states import Batch, Draws
 from .timing import Stopwatch
@@ -94,13 +95,32 @@ def search(
         if not kept:
             raise
         interrupted = True
-    watch = Stopwatch(step, seed)
+    watch, most = Stopwatch(step, seed), kept[0].state
+    slowest, median = _slowest(watch, draws, [each.state for each in kept], 0 if interrupted else _ROUNDS)
+    seconds, again = watch.seconds([most, slowest])
+    return WorstCase(
+        robot=step.robot.name,
+        tip=None,
+        formulation=step.formulation.name,
+        mode=str(step.mode),
+        most=Found.of(step, most, seconds),
+        slowest=Found.of(step, slowest, again),
+        median=median,
+        statuses=dict(statuses),
+        ticks=done,
+        seed=seed,
+        conditions=conditions(),
+    )
+
+
+def _slowest(watch: Stopwatch, draws: Draws, worst: list[Batch], rounds: int) -> tuple[Batch, float]:
+    """Find the slowest tick: typical ones, the worst ones, some near the slowest; with a typical one's time [s]."""
     typical = draws.anywhere(_TYPICAL, {})
     states = [typical.pick(index) for index in range(len(typical))]
     times = watch.seconds(states)
     median = float(np.median(times))
-    states, times = [*states, *(each.state for each in kept)], [*times, *watch.seconds([k.state for k in kept])]
-    for _ in range(0 if interrupted else _ROUNDS):
+    states, times = [*states, *worst], [*times, *watch.seconds(worst)]
+    for _ in range(rounds):
         slowest = sorted(range(len(states)), key=lambda i: -times[i])[:_SLOWEST]
         near = [draws.near(states[i], _NEIGHBOURS) for i in slowest]
         fresh = [batch.pick(i) for batch in near for i in range(len(batch))]
@@ -108,17 +128,7 @@ def search(
     # A minimum over few repeats still has luck in it: the last word is among the first few, timed once more.
     finalists = sorted(range(len(states)), key=lambda i: -times[i])[:_SLOWEST]
     again = watch.seconds([states[i] for i in finalists])
-    slow = int(np.argmax(again))
-    most = kept[0].state
-    return WorstCase.of(
-        step,
-        most=Found.of(step, most, watch.seconds([most])[0]),
-        slowest=Found.of(step, states[finalists[slow]], again[slow]),
-        median=median,
-        statuses=dict(statuses),
-        ticks=done,
-        seed=seed,
-    )
+    return states[finalists[int(np.argmax(again))]], median
 
 
 def _worst(kept: list[_Kept], step: CompiledStep, batch: Batch, statuses: Counter[str]) -> list[_Kept]:
