@@ -39,7 +39,8 @@ class Trial:
         A registered name, `module:Name`, or an instance.
     solver, robot, mode : str
     ticks, seed : int
-        States: joints anywhere, none to three of them near a limit, the hand in any direction.
+        States: joints anywhere, none to three of them near a limit, the hand in any direction; the arm at rest before,
+        for formulations that ask for the last command.
 
     Raises
     ------
@@ -90,8 +91,9 @@ class Trial:
         for _ in range(_REPEATS):
             for tick, (q, v) in enumerate(zip(*self.states, strict=True)):
                 for which, step in enumerate((mine, other)):
+                    inputs = _at_rest(step)
                     start = perf_counter()
-                    step(q, v)
+                    step(q, v, **inputs)
                     best[which, tick] = min(best[which, tick], perf_counter() - start)
         return float(np.median(best[0] / best[1]))
 
@@ -101,4 +103,8 @@ class Trial:
 
     @cached_property
     def _results(self) -> list[Any]:
-        return [self._step(q, v) for q, v in zip(*self.states, strict=True)]
+        return [self._step(q, v, **_at_rest(self._step)) for q, v in zip(*self.states, strict=True)]
+
+
+def _at_rest(step: Any) -> dict[str, Array]:
+    return {"qd_prev": np.zeros(step.robot.nv)} if "qd_prev" in step.inputs else {}

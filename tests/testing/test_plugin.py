@@ -97,3 +97,11 @@ def test_iterations_are_those_of_the_step_and_the_same_again() -> None:
     assert ((q >= robot.q_min) & (q <= robot.q_max)).all()
     assert Trial("cartesian-error", ticks=40, seed=6).states[0].tolist() != q.tolist()
     assert np.isfinite(v).all()
+
+
+def test_formulations_that_ask_for_the_last_command_start_at_rest() -> None:
+    trial = Trial("joint-space-robust", ticks=10, seed=1)
+    step = make_step(load_robot("lbr_med14"), "joint-space-robust", "fix-orientation")
+    wanted = [step(q, v, qd_prev=np.zeros(7)).iterations for q, v in zip(*trial.states, strict=True)]
+    assert list(trial.iterations) == wanted
+    assert trial.time_ratio > 0.0
