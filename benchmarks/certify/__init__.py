@@ -13,7 +13,7 @@ from .certificate import (
 from .cone import Condition, Decider, Tally
 from .enumeration import Enumeration, Region, enumerate_paths, follow
 from .method import DependentRowsError, DualMethod
-from .slices import Slice, SliceError, parse_side
+from .slices import Slice, SliceError, every_bound, parse_side
 from .states import drawn_states, read_state
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "compare",
     "drawn_states",
     "enumerate_paths",
+    "every_bound",
     "follow",
     "parse_side",
     "read_certificates",

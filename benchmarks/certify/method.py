@@ -174,15 +174,15 @@ class DualMethod:
         rates = [dot(row, along) for row in face.adjugate]  # T
         left = face.determinant * square - dot(along, rates)  # det |e|^2
         dependent = len(active) == self.m_free or left * _DEPENDENT <= square * face.determinant
-        if dependent and left:
-            raise DependentRowsError(
-                f"rows {[row for row, _ in (*active, entering)]} of M: dependent to rounding, not exactly"
-            )
         events: dict[int, tuple[Form, int]] = {}
+        by_rounding = dependent and left != 0
         for j, rate in enumerate(rates):
-            moved = rate * rate * self._squares[active[j][0]] * _UNMOVED > square * face.determinant**2
-            if rate > 0 and moved:
+            if rate > 0:
                 events[j] = face.multipliers[j], rate
+                by_rounding |= rate * rate * self._squares[active[j][0]] * _UNMOVED <= square * face.determinant**2
+        if by_rounding:
+            rows = sorted(row for row, _ in (*active, entering))
+            raise DependentRowsError(f"rows {rows} of M: some depend on others to rounding, but not exactly")
         if not dependent:
             events[-1] = self._outside(face, entering), left
         found = []

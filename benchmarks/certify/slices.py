@@ -164,3 +164,18 @@ def _condition(size: int, entries: Mapping[int, float], *, strict: bool = False)
     values = np.zeros(size)
     values[list(entries)] = list(entries.values())
     return Condition.exactly(values, strict=strict)
+
+
+def every_bound(M: Array) -> tuple[DualMethod, tuple[Condition, ...]]:
+    """Give the method on one M where all bounds are free, and which theta there are: 0 <= b.
+
+    theta = (v, b): the hand, -qd_lo and qd_hi. Everything about one M, then; fit for a few rows.
+
+    Parameters
+    ----------
+    M : ndarray, shape (nv, m_free)
+    """
+    nv, m = M.shape
+    nothing, all_ = np.zeros((nv, nv)), np.eye(nv)
+    given = tuple(_condition(m + 2 * nv, {m + k: 1.0}) for k in range(2 * nv))
+    return DualMethod(M, np.hstack([-all_, nothing]), np.hstack([nothing, all_])), given
