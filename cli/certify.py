@@ -126,13 +126,26 @@ def _broken(found: Certificate) -> bool:
 def _print(console: Console, result: Certificates) -> None:
     console.print(f"{result.formulation} on {result.robot}, {result.mode}", highlight=False)
     table = Table(box=None, padding=(0, 2, 0, 0))
-    heads = "state", "bound", "without ties", "compiled", "regions", "s", "ticks run", "differ", "refused", "q"
+    heads = (
+        "state",
+        "bound",
+        "without ties",
+        "compiled",
+        "regions",
+        "s",
+        "ticks run",
+        "differ",
+        "tolerated",
+        "refused",
+        "q",
+    )
     for head in heads:
         table.add_column(head)
     for index, each in enumerate(result.certificates):
         counts = (
             *(index, each.iterations, each.attained.proved, each.attained.compiled, sum(each.regions.values())),
-            *(f"{each.seconds:.1f}", each.agreement.compared, each.agreement.differing, each.agreement.refused),
+            *(f"{each.seconds:.1f}", each.agreement.compared, each.agreement.differing),
+            *(each.agreement.tolerated, each.agreement.refused),
         )
         q = np.array2string(np.array(each.q), precision=3, separator=", ", max_line_width=_WIDTH)
         table.add_row(*(str(count) for count in counts), q)

@@ -150,8 +150,15 @@ def _after(node: _Node, method: DualMethod, decider: Decider) -> list[tuple[Deci
     return found
 
 
-def follow(method: DualMethod, theta: Form) -> tuple[int, Sides]:
+def follow(method: DualMethod, theta: Form, tolerance: float = 0.0) -> tuple[int, Sides]:
     """Give the steps of one theta and the sides active at the end, exactly.
+
+    Parameters
+    ----------
+    method : DualMethod
+    theta : tuple of int
+    tolerance : float
+        Rows hold if no farther away than this share of |v|, as in the C code [-].
 
     Raises
     ------
@@ -165,5 +172,7 @@ def follow(method: DualMethod, theta: Form) -> tuple[int, Sides]:
         options = method.decisions(active, entering)
         taken = next(each for each in options if all(condition.holds(theta) for condition in each.conditions))
         if taken.steps == 0 and taken.entering is None:
+            return steps, active
+        if not taken.steps and taken.entering and method.distance(active, taken.entering, theta) <= tolerance:
             return steps, active
         active, entering, steps = taken.active, taken.entering, steps + taken.steps

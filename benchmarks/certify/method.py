@@ -7,8 +7,9 @@ follows from the active sides and the one that enters alone, whatever the way th
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
-from math import isqrt
+from fractions import Fraction
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -109,6 +110,16 @@ class DualMethod:
             )
         return self._next[key]
 
+    def distance(self, active: Sides, side: Side, theta: Form) -> float:
+        """How far the point on active sides is outside another one, as a share of |v|; 0 for a hand at rest [-]."""
+        face, v = self._face(active), theta[: self.m_free]
+        speed = dot(v, v)
+        if not speed:
+            return 0.0
+        outside = dot(self._outside(face, side), theta)
+        squared = Fraction(outside * outside, face.determinant**2 * self._squares[side[0]] * speed)
+        return math.copysign(math.sqrt(squared), outside)
+
     def _condition(self, form: Form, *, strict: bool) -> Condition:
         """One object for one condition, so that what was once proved of it is found again."""
         made = Condition.of(form, strict=strict)
@@ -157,7 +168,7 @@ class DualMethod:
     def _lengths(self, row: int, other: int) -> tuple[int, int]:
         """Reciprocals of two rows' lengths, up to a common factor; exact where their ratio is rational."""
         product = self._squares[row] * self._squares[other]
-        root = isqrt(product)
+        root = math.isqrt(product)
         if root * root == product:
             return root, self._squares[row]
         return self._per_length[row], self._per_length[other]

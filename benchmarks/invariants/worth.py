@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ...solvers import Status
+from ...solvers import QP, Status, get_solver
 from .answers import inputs_of
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:
     x : ndarray, shape (n,)
         Its answer.
     qd : ndarray, shape (nv,)
-        The command [rad/s or m/s]. What it doesn't say of x, such as a task scale at rest, is taken from the answer.
+        The command [rad/s or m/s]. What it leaves open in x, such as the scale of a task at rest, is chosen for it.
 
     Returns
     -------
@@ -88,10 +88,13 @@ def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:
     largest = max(1.0, float(np.abs(qd).max()))
     both = np.vstack([instance.K / largest, qp.A])
     off = np.concatenate([(qd - instance.K @ x - instance.k) / largest, qp.b - qp.A @ x])
-    move = _least(both, off, _MET * TOLERANCE)
-    there = x + move
     # At acceleration level x is some 1/dt times a command.
-    unit = max(1.0, 1.0 / float(np.abs(instance.K).max()))
+    reach = float(np.abs(instance.K).max())
+    unit = max(1.0, 1.0 / reach) if reach > 0.0 else 1.0
+    move, left = _least(both, off, _MET * TOLERANCE)
+    if left.size:
+        move = move + left @ _best_left(qp, x + move, left, unit)
+    there = x + move
     told = np.abs(instance.K @ there + instance.k - qd) / largest
     value, terms = qp.stacked @ there, np.maximum(np.abs(qp.stacked) @ np.abs(there), unit)
     missed = np.maximum(np.maximum(value - qp.upper, qp.lower - value), 0.0) / terms
@@ -103,17 +106,31 @@ def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:
     return max(float(told.max()), float(missed.max(initial=0.0))), max(difference, 0.0) / scale
 
 
-def _least(matrix: Array, wanted: Array, enough: float) -> Array:
+def _least(matrix: Array, wanted: Array, enough: float) -> tuple[Array, Array]:
     """Solve matrix x = wanted by as few singular directions, the largest first, as meet it to what is enough.
 
-    In the others x would be rounding of the command, divided by a singular value of next to nothing.
+    In the others x would be rounding of the command, divided by a singular value of next to nothing. Also gives the
+    directions that change nothing, as columns.
     """
-    left, sigma, right = np.linalg.svd(matrix, full_matrices=False)
+    left, sigma, right = np.linalg.svd(matrix)
+    rank = int(np.sum(sigma > 10.0 * np.finfo(float).eps * sigma[0]))
     x, rest = np.zeros(matrix.shape[1]), wanted
-    for k in np.flatnonzero(sigma > np.finfo(float).eps * sigma[0]):
+    for k in range(rank):
         if float(np.abs(rest).max()) <= enough:
             break
         along = float(left[:, k] @ rest)
         x = x + along / sigma[k] * right[k]
         rest = rest - along * left[:, k]
-    return x
+    return x, right[rank:].T
+
+
+def _best_left(qp: QP, x: Array, left: Array, unit: float) -> Array:
+    """Least cost among x + left t that keep the two-sided rows; no move where none does."""
+    rows, lower, upper = qp.stacked[qp.m_eq :], qp.lower[qp.m_eq :], qp.upper[qp.m_eq :]
+    value = rows @ x
+    # Half of what is allowed: the other half is for the rounding of this.
+    slack = 0.5 * TOLERANCE * np.maximum(np.abs(rows) @ np.abs(x), unit)
+    gradient = left.T @ (qp.H @ x + qp.g)
+    part = QP(H=left.T @ qp.H @ left, g=gradient, C=rows @ left, l=lower - slack - value, u=upper + slack - value)
+    found = get_solver("active-set").solve(part)
+    return found.x if found.solved else np.zeros(left.shape[1])
