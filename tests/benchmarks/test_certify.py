@@ -158,6 +158,18 @@ def test_free_bounds_are_met_through_position_limits(interpreted: InterpretedSte
     assert interpreted.evaluate(Q, v, **inputs).qd_hi[1] == pytest.approx(0.25, abs=1e-9)
 
 
+def test_where_bounds_are_less_than_the_tolerance_the_compiled_tick_stops_as_soon_as_rows_hold_to_it() -> None:
+    mode, rng = "plane:0,1,0", np.random.default_rng(0)
+    # Joints 1e-13 rad from limits may move by 1e-10 rad/s, and rows hold to 1e-12 of a hand of up to 1 km/s.
+    q = np.where(rng.random(7) < 0.5, ROBOT.q_min + 1e-13, ROBOT.q_max - 1e-13)
+    q[[0, 2]] = 0.3
+    step = compile_step(ROBOT, CartesianError(), Mode.parse(mode))
+    found = certify(Slice(make_step(ROBOT, CartesianError(), mode), q, speed=1e3), step)
+    assert found.agreement.tolerated > 10
+    assert found.agreement.differing == 0
+    assert found.attained.compiled <= found.attained.proved == found.iterations
+
+
 @settings(deadline=None)
 @given(st.floats(0.0, 2.0), st.floats(0.5, 20.0), st.sampled_from(["viable", "thesis"]))
 def test_reach_inverts_the_bound(bound: float, qdd_max: float, name: str) -> None:
