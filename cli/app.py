@@ -26,6 +26,7 @@ from ..benchmarks import (
     sweep,
     sweep_table,
 )
+from ..benchmarks.certify import SliceError
 from ..benchmarks.worst_case import CaseError
 from ..codegen import CurvatureError, ExportError, export_c
 from ..control import export_guiding
@@ -34,6 +35,7 @@ from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
+from .certify import run_certify
 from .davinci import run_davinci
 from .interrupt import interruptible
 from .report import run_compare, run_report
@@ -58,6 +60,7 @@ USER_ERRORS = (
     PluginError,
     ReportError,
     RobotError,
+    SliceError,
     StoreError,
     UnknownOptionError,
     OSError,
@@ -76,6 +79,7 @@ app.command("report")(run_report)
 app.command("compare")(run_compare)
 app.command("davinci")(run_davinci)
 app.command("worst-case")(run_worst_case)
+app.command("certify")(run_certify)
 
 
 @app.command("list")

@@ -19,6 +19,7 @@ from .compiled import judge_compiled, judge_parity
 from .declared import judge_declared
 from .states import States, StateSet, arm
 from .tally import Row
+from .worth import judge_worth
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -123,7 +124,8 @@ def run_block(block: Block) -> list[Row]:
         compiled = judge_compiled(row, made_c, mine, GIVEN, stop[: row.states])
         if REFERENCE in interpreted:
             recorder.solver = get_solver(REFERENCE)
-            judge_parity(row, (step, made_c), mine, GIVEN, interpreted[REFERENCE], compiled)
+            apart = judge_parity(row, (step, made_c), mine, GIVEN, interpreted[REFERENCE], compiled)
+            judge_worth(row, step, mine, GIVEN, compiled, apart)
         row.cpu = process_time() - start
     return list(rows.values())
 

@@ -94,8 +94,8 @@ def judge_parity(
     given: Mapping[str, ArrayLike],
     answers: Answers,
     compiled: tuple[Array, NDArray[np.intc]],
-) -> None:
-    """Compare compiled with interpreted commands, of the states that both have."""
+) -> NDArray[np.bool_]:
+    """Compare compiled with interpreted commands, of the states that both have; give which are too far apart."""
     count = min(len(answers.qd), len(compiled[0]))
     qd, solved = compiled[0][:count], compiled[1][:count] == 0
     wanted, known = answers.qd[:count], answers.solved[:count]
@@ -111,6 +111,7 @@ def judge_parity(
     row.notes["solved by compiled only"] = int(np.sum(solved & ~known))
     row.check("parity", apart, allowed, states)
     row.check("apart", apart, _FAR, states)
+    return np.asarray((apart > allowed) | (apart > _FAR))
 
 
 def moved(

@@ -34,6 +34,8 @@ INVARIANTS: Final[Mapping[str, str]] = {
     "parity": "compiled: difference from the interpreted command, relative, at least 1 rad/s; 1e-9 is allowed, or what "
     "either command moves by when the joints move by 1e-10",
     "apart": "the same difference, whatever the neighbours say",
+    "compiled rows": "compiled: error of a row of the interpreted step's problem, relative to its terms, at least 1",
+    "compiled cost": "compiled: cost in that problem above its answer's, relative to its terms and what a move costs",
     "cvxpy numbers": "difference of the declared objective in cvxpy, relative",
     "cvxpy answer": "difference in cost, or scaled primal residual, of the declared problem solved by cvxpy",
 }
