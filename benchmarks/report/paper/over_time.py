@@ -77,7 +77,7 @@ def _grid(
             axis.plot(x, values, color=one.colour, linewidth=0.6)
         else:
             axis.plot(x, values, ".", color=one.colour, markersize=2.5, markeredgewidth=0.0)
-        axis.set_title(f"{cell.formulation}, {cell.solver}", loc="left")
+        axis.set_title(cell.formulation if cell.is_baseline else f"{cell.formulation}, {cell.solver}", loc="left")
         if kind == "times":
             axis.set_yscale("log")
         if row == len(solvers) - 1:
