@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from .requirements import Requirement
 
 _CONTROLLER: Final = ("formulation", "solver", "start")
-# Against the best on the same scenario: how much of the hand's motion limits and reach leave is the scenario's.
-_RELATIVE: Final = "workspace"
 
 
 def records(store: Store) -> pl.DataFrame:
@@ -62,7 +60,8 @@ def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
     Returns
     -------
     pl.DataFrame
-        One row per controller (`formulation`, `solver`, `start`) with `scenarios`, on how many it was run, and for each
+        One row per controller (`formulation`, `solver`, `start`; the last two of a baseline are "-") with `scenarios`,
+        on how many it was run, and for each
         of `REQUIREMENTS` its value in the scenario where it was worst, `KEY`; that scenario, `KEY_scenario`; and
         whether it passes, `KEY_pass`. Null where no scenario measures it: not measured is not passed. `passed` and
         `measured` count.
@@ -75,9 +74,7 @@ def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
     for name in (*_CONTROLLER, "scenario", *(f"requirement_{each.key}" for each in REQUIREMENTS)):
         if name not in cells.columns:
             raise RecordsError(f"records: expected a column {name!r}, got {', '.join(cells.columns)}")
-    own = f"requirement_{_RELATIVE}"
     cells = cells.with_columns(cs.starts_with("requirement_").cast(pl.Float64))
-    cells = cells.with_columns(pl.col(own) / pl.col(own).max().over("scenario"))
     rows = []
     for key, group in cells.group_by(_CONTROLLER, maintain_order=True):
         row: dict[str, object] = dict(zip(_CONTROLLER, key, strict=True))

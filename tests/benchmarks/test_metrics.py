@@ -108,7 +108,6 @@ def test_what_of_the_hands_motion_is_not_made() -> None:
     # The last tick doesn't count: that hand is at rest.
     assert record["task_scale_loss"] == pytest.approx(0.8 / 3)
     assert record["time_lost"] == pytest.approx(0.8e-3)
-    assert record["requirement_workspace"] == pytest.approx(2.2 / 3)
 
 
 def test_limits_and_accelerations() -> None:
