@@ -75,6 +75,8 @@ class TimedCell:
         """
         frame = self._visits.frame()
         notes = [text for name, text in (("own", _NO_OWN), ("c", _NO_C)) if frame[name].null_count() == len(frame)]
+        if frame["own"].null_count() < len(frame):
+            notes.append(f"own is {self._solver.own_timer}")
         return self._visits.result(sum(len(window.ticks) for window in self._windows), notes)
 
     def _window(self, window: Window, rows: dict[str, list[float | int | None]], answers: list[Array]) -> None:

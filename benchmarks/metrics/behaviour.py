@@ -46,7 +46,7 @@ class Iterations:
     def of(cls, ticks: Ticks) -> Iterations:
         """Sum up a cell's ticks."""
         counts = ticks.column("iterations")
-        known = bool(np.all(counts >= 0))
+        known = not np.isnan(counts).any()
         active = [frozenset(names or ()) for names in ticks.frame["active"].to_list()]
         in_order = [] if ticks.loop == "sampled" else pairwise(active)
         changes = np.array([len(a ^ b) for a, b in in_order], dtype=float)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Final
 import polars as pl
 import polars.selectors as cs
 
-from ..scenarios import get_scenario
+from .kept import record_of
 from .ratios import RecordsError
-from .record import cell_record
 from .requirements import REQUIREMENTS
 
 if TYPE_CHECKING:
@@ -22,18 +21,14 @@ _CONTROLLER: Final = ("formulation", "solver", "start")
 def records(store: Store) -> pl.DataFrame:
     """Make the records of all cells of a sweep that have been run, one row each; see `CellRecord`.
 
+    They are kept in the folder, and made anew where a cell's files or this library have changed.
+
     Parameters
     ----------
     store : Store
         The results folder.
     """
-    rows = [
-        cell_record(
-            store.ticks(cell), store.times(cell), get_scenario(cell.scenario),
-            formulation=cell.formulation, solver=cell.solver, start=cell.start,
-        ).flat() | {"scenario": cell.scenario}
-        for cell in store.cells()
-    ]  # fmt: skip
+    rows = [record_of(store, cell) for cell in store.cells()]
     # What no cell has is a column of numbers all the same.
     return pl.DataFrame(rows, infer_schema_length=None).with_columns(cs.by_dtype(pl.Null).cast(pl.Float64))
 

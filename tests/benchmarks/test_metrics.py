@@ -42,7 +42,7 @@ def test_iterations_and_changes_of_the_active_set() -> None:
 
 
 def test_a_solver_that_tells_no_iterations_has_none() -> None:
-    record = flat(ticks_frame(2, iterations=[-1, -1]))
+    record = flat(ticks_frame(2, iterations=[None, None]))
     assert record["iterations_mean"] is None
     assert record["changes_max"] == 0.0
 

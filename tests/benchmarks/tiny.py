@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from kinqp.solvers import QP
 
 
+HERE_TINY = "tests.benchmarks.tiny:tiny"
+
+
 def tiny() -> Scenario:
     """Twenty ticks of the semicircle."""
     scenario = get_scenario("semicircle")

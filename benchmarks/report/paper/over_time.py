@@ -25,7 +25,7 @@ def iterations_figure(series: Sequence[Series], scenario: Scenario) -> Figure | 
     """Iterations per tick, one panel per formulation and solver (figure 4.6); None where nothing was run."""
 
     def curve(one: Series) -> Curve | None:
-        if one.ticks is None or not len(one.ticks):
+        if one.ticks is None or not len(one.ticks) or one.ticks["iterations"].has_nulls():
             return None
         values = one.ticks["iterations"].to_numpy().astype(float)
         at = extremes(values, BUCKETS)
