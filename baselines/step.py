@@ -46,6 +46,11 @@ class BaselineStep:
       refused.
 
     Not to be shared between threads.
+
+    Attributes
+    ----------
+    situation : Situation or None
+        What was resolved in the last call: the evidence behind its result.
     """
 
     def __init__(self, robot: Robot, baseline: Baseline, mode: Mode) -> None:
@@ -54,6 +59,7 @@ class BaselineStep:
         self.baseline: Final = baseline
         self.solver: Final = NoSolver()
         self._observe: Final = Observer(baseline, robot, mode)
+        self.situation: Situation | None = None
 
     @property
     def specs(self) -> tuple[Input, ...]:
@@ -86,7 +92,7 @@ class BaselineStep:
         InputError
             Naming the input that is unknown, missing, of the wrong shape, not finite or out of range.
         """
-        at = self.observe(q, v, **inputs)
+        self.situation = at = self.observe(q, v, **inputs)
         start = perf_counter()
         resolved = self.baseline.resolve(at)
         return self._judge(at, resolved, perf_counter() - start)

@@ -14,16 +14,19 @@ if TYPE_CHECKING:
 
 #: How a solver starts: from nothing, from the last active set, from the last solution.
 STARTS: Final = ("cold", "active-set", "solution")
+#: Stands where a baseline's cell would have its solver and its start: a closed form has neither.
+NONE: Final = "-"
 # File systems allow 255 bytes; room is left for what is put behind.
 _LONGEST_NAME: Final = 180
 
 
 @dataclass(frozen=True, order=True)
 class Block:
-    """One scenario x formulation: all its cells are asked the same problems."""
+    """One scenario x formulation: all its cells are asked the same problems; of a baseline it is the only cell."""
 
     scenario: str
     formulation: str
+    baseline: bool = False
 
     def __str__(self) -> str:
         """Write it for people."""
@@ -32,12 +35,15 @@ class Block:
     @property
     def file_stem(self) -> str:
         """Name of its files, without what is put behind."""
-        return _file_stem(self.scenario, self.formulation)
+        return _file_stem(self.scenario, self.formulation, *([NONE] if self.baseline else []))
 
 
 @dataclass(frozen=True, order=True)
 class Cell:
-    """One scenario x formulation x solver x start; `start` is one of `STARTS`."""
+    """One scenario x formulation x solver x start; `start` is one of `STARTS`.
+
+    Or scenario x baseline: its name stands where a formulation's does, and solver and start are `NONE`.
+    """
 
     scenario: str
     formulation: str
@@ -46,13 +52,25 @@ class Cell:
 
     def __str__(self) -> str:
         """Write it for people."""
+        if self.is_baseline:
+            return f"{self.scenario} / {self.formulation}"
         start = "" if self.start == "cold" else f" from last {self.start}"
         return f"{self.scenario} / {self.formulation} / {self.solver}{start}"
+
+    @classmethod
+    def of_baseline(cls, scenario: str, baseline: str) -> Cell:
+        """Make a baseline's cell."""
+        return cls(scenario, baseline, NONE, NONE)
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether what is run is a baseline, without solver and start."""
+        return self.solver == NONE
 
     @property
     def block(self) -> Block:
         """Where its problems come from."""
-        return Block(self.scenario, self.formulation)
+        return Block(self.scenario, self.formulation, self.is_baseline)
 
     @property
     def file_stem(self) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 
+from ..baselines import available_baselines, get_baseline
 from ..formulations import available_formulations, get_formulation
 from ..solvers import available_solvers, get_solver
 from ..solvers.plugins import PluginError
@@ -22,14 +23,18 @@ ALL: Final = "all"
 
 
 class Product(BaseModel):
-    """Every scenario x formulation x solver, each with every start that the solver has.
+    """Every scenario x formulation x solver, each with every start that the solver has; and scenario x baseline.
 
     Names take options in brackets: ``"clarabel(tolerance=1e-8)"``; "all" stands for all there are.
 
     Parameters
     ----------
-    scenarios, formulations, solvers : tuple of str
+    scenarios, solvers : tuple of str
         At least one each.
+    baselines : tuple of str
+        Closed forms to compare with, which have no solver and no start; none unless named.
+    formulations : tuple of str
+        At least one; none where there are baselines.
     starts : tuple of {"cold", "active-set", "solution"}
         How the solvers start. Starts that a solver does not have are left out, and named in the manifest.
     skip_missing : bool
@@ -40,11 +45,13 @@ class Product(BaseModel):
 
     skip_missing: bool = False
     scenarios: Names = ("semicircle",)
-    formulations: Names = ("cartesian-error", "joint-space")
+    # Before the formulations, of which there may be none where there are baselines.
+    baselines: tuple[str, ...] = ()
+    formulations: tuple[str, ...] = ("cartesian-error", "joint-space")
     solvers: Names = ("active-set", "thesis-active-set", "clarabel", "piqp")
     starts: Names = ("cold",)
 
-    @field_validator("scenarios", "formulations", "solvers", mode="after")
+    @field_validator("scenarios", "baselines", "formulations", "solvers", mode="after")
     @classmethod
     def _expanded(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         if ALL not in names:
@@ -53,7 +60,7 @@ class Product(BaseModel):
         everything = CHOICES[str(info.field_name)]()
         return (*everything, *(name for name in names if name != ALL and name not in everything))
 
-    @field_validator("scenarios", "formulations", "solvers", "starts")
+    @field_validator("scenarios", "baselines", "formulations", "solvers", "starts")
     @classmethod
     def _each_once(cls, names: tuple[str, ...]) -> tuple[str, ...]:
         twice = sorted({name for name in names if names.count(name) > 1})
@@ -68,9 +75,22 @@ class Product(BaseModel):
             get_scenario(name)
         return names
 
+    @field_validator("baselines")
+    @classmethod
+    def _baselines_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            try:
+                get_baseline(name)
+            except TypeError as error:  # an unknown option; see `starts_of`
+                raise ValueError(str(error)) from error
+        return names
+
     @field_validator("formulations")
     @classmethod
-    def _formulations_exist(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+    def _formulations_exist(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        if not names and not info.data.get("baselines"):
+            choices = ", ".join(available_formulations())
+            raise ValueError(f"expected at least one of {choices}, or {ALL!r}, got an empty list and no baselines")
         for name in names:
             get_formulation(name)
         return names
@@ -92,11 +112,15 @@ class Product(BaseModel):
         return names
 
     def cells(self) -> tuple[Cell, ...]:
-        """Its cells in the order of its lists."""
-        return tuple(Cell(*names) for names in self._combined() if names[3] in self._starts(names[2]))
+        """Its cells in the order of its lists, baselines last."""
+        solved = [Cell(*names) for names in self._combined() if names[3] in self._starts(names[2])]
+        closed = [Cell.of_baseline(scenario, name) for scenario in self.scenarios for name in self.baselines]
+        return (*solved, *closed)
 
     def skipped(self) -> dict[str, str]:
         """What is left out of the product, as "solver from last start", and why."""
+        if not self.formulations:
+            return {}
         without = {solver: why for solver in self.solvers if (why := missing(solver))}
         return without | {
             f"{solver} from last {start}": f"{solver} starts {', '.join(starts_of(solver))} only"
@@ -211,6 +235,7 @@ def missing(solver: str) -> str:
 
 CHOICES: Final[dict[str, Callable[[], tuple[str, ...]]]] = {
     "scenarios": available_scenarios,
+    "baselines": available_baselines,
     "formulations": available_formulations,
     "solvers": lambda: available_solvers(bridges=True),
 }

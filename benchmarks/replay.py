@@ -4,32 +4,31 @@ from __future__ import annotations
 
 import gc
 from contextlib import contextmanager
-from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import polars as pl
 
+from .baseline_block import TimedBaseline
 from .cells import solver_of
-from .problems import Window
-from .store import Part
+from .situations import Situations
 from .timing_c import c_replay
+from .visits import Visits, affordable, no_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    import polars as pl
     from numpy.typing import NDArray
 
     from ..solvers import QP, Solution
     from .cells import Cell
     from .config import SweepConfig
-    from .problems import Problems
+    from .problems import Problems, Window
+    from .store import Part
 
     Array = NDArray[np.float64]
 
 _NO_C: Final = "c is null: no C of this solver is replayed"
-# How often a few ticks are tried to see how long they take.
-_TRIALS: Final = 3
 _NO_OWN: Final = "own is null: the solver has no timer of its own"
 
 
@@ -49,30 +48,24 @@ class TimedCell:
         self._problems: Final = problems
         self._solver: Final = solver_of(cell)
         self._c: Final = c_replay(self._solver)
-        self._frames: Final[list[pl.DataFrame]] = []
-        self._first: list[Array] | None = None
-        self._deterministic = True
-        self._windows: Final = self._affordable(config.timing_budget / config.repeats)
+        self._visits: Final = Visits()
+        # The first call of all may import, build and allocate.
+        self._solver.solve(problems.qps[problems.windows[0].lead][0])
+        self._windows: Final = affordable(
+            problems.windows, config.timing_budget / config.repeats, lambda window: self._window(window, no_rows(), [])
+        )
         self._sequence: Final = [qp for window in self._windows for qp in self._qps(window)]
         self._fresh: Final = _fresh(self._windows, problems.qps)
 
     def visit(self, repeat: int) -> None:
         """Solve all problems once, and keep the times."""
-        rows = _no_rows()
+        rows = no_rows()
         answers: list[Array] = []
         for window in self._windows:
             self._window(window, rows, answers)
         times = self._c.seconds(self._sequence, self._fresh) if self._c is not None else None
-        frame = pl.DataFrame(rows, schema={"tick": pl.Int64} | dict.fromkeys(list(rows)[1:], pl.Float64))
-        c = [None] * len(frame) if times is None else _per_tick(times, self._windows, self._problems.qps)
-        self._frames.append(
-            frame.with_columns(pl.lit(repeat, dtype=pl.Int64).alias("repeat"), pl.Series("c", c, dtype=pl.Float64))
-        )
-        if self._first is None:
-            self._first = answers
-        self._deterministic &= all(
-            np.array_equal(a, b, equal_nan=True) for a, b in zip(self._first, answers, strict=True)
-        )
+        c = None if times is None else _per_tick(times, self._windows, self._problems.qps)
+        self._visits.add(repeat, rows, answers, c)
 
     def result(self) -> tuple[pl.DataFrame, Part]:
         """All times, one tick of one repeat per row, and how the cell ended.
@@ -80,11 +73,11 @@ class TimedCell:
         Columns: `tick`, `repeat`; `wall_setup` of a window's first tick, `wall_update` of all others (null for the
         other kind); `wall_solve`; `own`, the solver's own timer; `c`, the solve in C; all [s].
         """
-        frame = pl.concat(self._frames).select("tick", "repeat", "wall_setup", "wall_update", "wall_solve", "own", "c")
+        frame = self._visits.frame()
         notes = [text for name, text in (("own", _NO_OWN), ("c", _NO_C)) if frame[name].null_count() == len(frame)]
-        ticks = sum(len(window.ticks) for window in self._windows)
-        part = Part("done", "", "replay", ticks, len(self._frames), self._deterministic, tuple(notes))
-        return frame, part
+        if frame["own"].null_count() < len(frame):
+            notes.append(f"own is {self._solver.own_timer}")
+        return self._visits.result(sum(len(window.ticks) for window in self._windows), notes)
 
     def _window(self, window: Window, rows: dict[str, list[float | int | None]], answers: list[Array]) -> None:
         solver = self._solver
@@ -99,38 +92,12 @@ class TimedCell:
             rows["wall_solve"].append(sum(solution.solve_time for solution in solutions))
             rows["own"].append(_own(solutions))
 
-    def _affordable(self, budget: float) -> tuple[Window, ...]:
-        """Windows, from the first, that one visit has time for [s]: at least one tick."""
-        first = self._problems.windows[0]
-        # The first call of all may import, build and allocate.
-        self._solver.solve(self._problems.qps[first.lead][0])
-        short = Window(first.lead, first.ticks[:3])
-        taken: list[float] = []
-        # The best of a few, since others on the machine make it longer; of one, where that alone is too long.
-        while len(taken) < _TRIALS and sum(taken) < budget:
-            start = perf_counter()
-            self._window(short, _no_rows(), [])
-            taken.append(perf_counter() - start)
-        each = min(taken) / (1 + len(short.ticks))
-        windows: list[Window] = []
-        for window in self._problems.windows:
-            ticks = window.ticks[: max(int(budget / each) - 1, 0)]
-            budget -= each * (1 + len(ticks))
-            if not ticks:
-                break
-            windows.append(Window(window.lead, ticks))
-        return tuple(windows) or (Window(first.lead, first.ticks[:1]),)
-
     def _qps(self, window: Window) -> list[QP]:
         return [qp for tick in (window.lead, *window.ticks) for qp in self._problems.qps[tick]]
 
 
-def _no_rows() -> dict[str, list[float | int | None]]:
-    return {name: [] for name in ("tick", "wall_setup", "wall_update", "wall_solve", "own")}
-
-
 def time_block(
-    problems: Problems,
+    problems: Problems | Situations,
     cells: Sequence[Cell],
     config: SweepConfig,
     on_visit: Callable[[Cell, int], None],
@@ -143,8 +110,8 @@ def time_block(
 
     Parameters
     ----------
-    problems : Problems
-        The block's.
+    problems : Problems or Situations
+        The block's; situations of a baseline's.
     cells : sequence of Cell
         Of the block.
     config : SweepConfig
@@ -158,7 +125,7 @@ def time_block(
     tuple of Cell, pl.DataFrame, Part
         As `TimedCell.result` has them, when all are done.
     """
-    timed: dict[Cell, TimedCell] = {}
+    timed: dict[Cell, TimedCell | TimedBaseline] = {}
     rng = np.random.default_rng(config.seed)
     with _no_garbage_collection():
         for repeat in range(-1, config.repeats):
@@ -169,7 +136,7 @@ def time_block(
                 on_visit(cell, repeat)
                 try:
                     if repeat < 0:
-                        timed[cell] = TimedCell(cell, problems, config)
+                        timed[cell] = _timed(cell, problems, config)
                     else:
                         timed[cell].visit(repeat)
                 except Exception as error:  # noqa: BLE001  # whatever a solver raises ends this cell, not the others
@@ -177,6 +144,12 @@ def time_block(
                     on_failure(cell, f"{type(error).__name__}: {error}")
     for cell, one in timed.items():
         yield cell, *one.result()
+
+
+def _timed(cell: Cell, problems: Problems | Situations, config: SweepConfig) -> TimedCell | TimedBaseline:
+    if isinstance(problems, Situations):
+        return TimedBaseline(cell, problems, config)
+    return TimedCell(cell, problems, config)
 
 
 def _fresh(windows: Sequence[Window], qps: dict[int, tuple[QP, ...]]) -> list[bool]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from .cells import Block
 
 _FORMAT: Final = 2
-_FOLDERS: Final = ("ticks", "times", "cells", "problems")
+_FOLDERS: Final = ("ticks", "times", "cells", "problems", "records")
 # Between a sweep and its continuation these may differ.
 _MAY_CHANGE: Final = frozenset({"date"})
 
@@ -204,6 +204,15 @@ class Store:
         """Times of a cell, one tick of one repeat per row, as `kinqp.benchmarks.replay` has them; None: not timed."""
         path = self._file("times", cell)
         return pl.read_parquet(path) if path.exists() else None
+
+    def content(self, cell: Cell) -> bytes:
+        """Bytes of a cell's files: the same frames where they are the same."""
+        parts = [path.read_bytes() for path in (self._file("ticks", cell), self._file("times", cell)) if path.exists()]
+        return b"".join(len(part).to_bytes(8, "big") + part for part in parts)
+
+    def record(self, cell: Cell) -> Path:
+        """Where a cell's record is kept."""
+        return self.folder / "records" / f"{cell.file_stem}.json"
 
     def add_accuracy(self, cell: Cell, ticks: bytes | None, part: Part) -> None:
         """Keep the accuracy part of a cell: its ticks as a Parquet file, none where it failed."""

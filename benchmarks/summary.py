@@ -53,8 +53,8 @@ class CellSummary:
     ----------
     ticks : int
         Size of the run.
-    iterations : Spread
-        Over ticks.
+    iterations : Spread or None
+        Over ticks; None where the solver tells none.
     time : Spread or None
         Update plus solve through Python [s], over timed ticks and repeats; None where there are no times.
     setup, own, c : float
@@ -76,7 +76,7 @@ class CellSummary:
     """
 
     ticks: int
-    iterations: Spread
+    iterations: Spread | None
     time: Spread | None
     setup: float
     own: float
@@ -104,7 +104,7 @@ def cell_summary(ticks: pl.DataFrame, times: pl.DataFrame | None, scenario: Scen
     length = ticks["eps"].list.eval(pl.element() ** 2).list.sum().sqrt()
     return CellSummary(
         ticks=len(ticks),
-        iterations=Spread.of(ticks["iterations"].to_numpy().astype(float)),
+        iterations=None if ticks["iterations"].has_nulls() else Spread.of(ticks["iterations"].to_numpy().astype(float)),
         time=None if times is None else Spread.of((times["wall_update"] + times["wall_solve"]).drop_nulls().to_numpy()),
         setup=_median(times, "wall_setup"),
         own=_median(times, "own"),

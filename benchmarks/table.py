@@ -56,6 +56,10 @@ def sweep_table(store: Store) -> RenderableType:
     )
     for what, why in manifest.skipped.items():
         parts.append(Text(f"skipped: {what}: {why}"))
+    timings = {cell.solver: store.outcome(cell).timing for cell in store.cells()}
+    for solver, timing in timings.items():
+        notes = timing.notes if timing is not None else ()
+        parts += [Text(f"{solver}: {note}") for note in notes if note.startswith("own is the") or "set-up" in note]
     for cell, why in store.failed().items():
         parts.append(Text(f"failed: {cell}: {why}"))
     parts.append(Text("; ".join(f"{key} {value}" for key, value in manifest.conditions.items())))
@@ -83,13 +87,14 @@ def _scenario_table(scenario: Scenario, rows: list[tuple[Cell, CellSummary]]) ->
     last = ""
     for cell, m in rows:
         time = () if m.time is None else (m.time.p50, m.time.p95, m.time.p99, m.time.max)
+        counts = (math.nan,) * 3
+        if m.iterations is not None:
+            counts = (m.iterations.mean, m.iterations.p99, m.iterations.max)
         table.add_row(
             cell.formulation if cell.formulation != last else "",
             cell.solver,
             cell.start,
-            f"{m.iterations.mean:.2f}",
-            f"{m.iterations.p99:.0f}",
-            f"{m.iterations.max:.0f}",
+            *(_figure(x, form) for x, form in zip(counts, (".2f", ".0f", ".0f"), strict=True)),
             *(_figure(1e6 * x, ".0f") for x in time or (math.nan,) * 4),
             _figure(1e6 * m.own, ".1f"),
             _figure(1e6 * m.c, ".1f"),

@@ -16,6 +16,7 @@ from .messages import Prepare, Ran, Refused, Run, Time, Visiting
 
 if TYPE_CHECKING:
     from .accuracy import PreparedBlock
+    from .baseline_block import BaselineBlock
     from .cells import Block, Cell
     from .config import SweepConfig
 
@@ -27,7 +28,7 @@ _KEPT: Final = 3
 
 def serve(connection: Connection) -> None:
     """Answer requests until the parent is gone."""
-    blocks: dict[_Key, PreparedBlock] = {}
+    blocks: dict[_Key, PreparedBlock | BaselineBlock] = {}
     last: _Key | None = None
     while True:
         try:
@@ -49,18 +50,20 @@ def serve(connection: Connection) -> None:
         connection.send(answer)
 
 
-def _prepare(request: Prepare, blocks: dict[_Key, PreparedBlock]) -> bytes | None:
+def _prepare(request: Prepare, blocks: dict[_Key, PreparedBlock | BaselineBlock]) -> bytes | None:
     from .accuracy import PreparedBlock
+    from .baseline_block import BaselineBlock
 
     key = (request.block, request.config)
     if key not in blocks:
         while len(blocks) >= _KEPT:
             blocks.pop(next(iter(blocks)))
-        blocks[key] = PreparedBlock(request.block, request.config)
+        kind = BaselineBlock if request.block.baseline else PreparedBlock
+        blocks[key] = kind(request.block, request.config)
     return blocks[key].problems.to_bytes() if request.problems else None
 
 
-def _run(cell: Cell, block: PreparedBlock) -> Ran:
+def _run(cell: Cell, block: PreparedBlock | BaselineBlock) -> Ran:
     from .store import parquet
 
     frame, part = block.run(cell)
@@ -70,13 +73,17 @@ def _run(cell: Cell, block: PreparedBlock) -> Ran:
 def _time(request: Time, connection: Connection) -> None:
     from .problems import Problems
     from .replay import time_block
+    from .scenarios import get_scenario
+    from .situations import Situations
     from .store import Part, parquet
 
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
-    problems = Problems.from_bytes(request.problems)
+    first, problems = request.cells[0], request.problems
     for cell, frame, part in time_block(
-        problems,
+        Situations.from_bytes(problems, get_scenario(first.scenario))
+        if first.is_baseline
+        else Problems.from_bytes(problems),
         request.cells,
         request.config,
         lambda cell, repeat: connection.send(Visiting(cell, repeat)),

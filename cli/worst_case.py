@@ -58,12 +58,20 @@ def run_worst_case(
             interrupted()
             progress.update(bar, completed=done, total=total, description=f"most iterations: {most}")
 
-        found = search(step, ticks=ticks, seed=seed, on_progress=on_progress)
-    case = replace(found, robot=robot, tip=tip, formulation=formulation)
+        def named(found: WorstCase) -> WorstCase:
+            return replace(found, robot=robot, tip=tip, formulation=formulation)
+
+        def on_found(found: WorstCase) -> None:
+            write_case(named(found), out)
+            progress.update(bar, description=f"timing; most iterations: {found.most.iterations}")
+
+        case = named(search(step, ticks=ticks, seed=seed, on_progress=on_progress, on_found=on_found))
     write_case(case, out)
     _print(console, case)
     if case.ticks < ticks:
         console.print(f"Interrupted after {case.ticks} of {ticks} ticks; what was found is kept.")
+    elif case.median is None:
+        console.print("Interrupted before ticks were timed; what was found is kept.")
     console.print(f"Wrote both states to {out}. Next: kinqp worst-case --replay {out}")
 
 
@@ -90,7 +98,7 @@ def _show_again(console: Console, path: Path) -> None:
     console.print("Iterations and status are the same.")
 
 
-def _table(most: Found, slowest: Found, median: float) -> Table:
+def _table(most: Found, slowest: Found, median: float | None) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("", "iterations", "status", "time us", "of a typical tick", "active rows"):
         table.add_column(head)
@@ -99,8 +107,8 @@ def _table(most: Found, slowest: Found, median: float) -> Table:
             name,
             str(found.iterations),
             found.status,
-            f"{found.seconds * 1e6:.2f}",
-            f"{found.seconds / median:.2f} x",
+            "-" if found.seconds is None else f"{found.seconds * 1e6:.2f}",
+            "-" if found.seconds is None or median is None else f"{found.seconds / median:.2f} x",
             ", ".join(found.active) or "none",
         )
     return table

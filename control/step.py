@@ -23,6 +23,8 @@ from ..formulations import (
 from ..solvers import PluginError, Status, get_solver
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import ArrayLike, NDArray
 
     from ..formulations import Formulation, Input, Instance
@@ -157,7 +159,7 @@ class InterpretedStep:
             qd=command,
             eps=instance.J_free @ command - instance.v,
             status=status,
-            iterations=sum(each.iterations for _, each in levels),
+            iterations=_total(each.iterations for _, each in levels),
             active=active if solved else (),
             fixed_error=kept.fixed_error,
             bound_violation=kept.bound_violation,
@@ -171,6 +173,12 @@ class InterpretedStep:
 def _command(instance: Instance, solution: Solution) -> Array:
     command: Array = instance.K @ solution.x + instance.k
     return command
+
+
+def _total(counts: Iterable[int | None]) -> int | None:
+    """Sum of counts; None where one of them is not known."""
+    known = list(counts)
+    return None if None in known else sum(count for count in known if count is not None)
 
 
 def _smallest_singular_value(matrix: Array) -> float:

@@ -30,8 +30,8 @@ class StepResult:
         Cartesian error J_free qd - v of that command [m/s, rad/s].
     status : Status
         SOLVED, or why the command is the safe stop.
-    iterations : int
-        As the solver counts them.
+    iterations : int or None
+        As the solver counts them; None where it tells no count.
     active : tuple of str
         Rows that hold the solution back, as in "joint limits[3] upper"; empty at a safe stop.
     fixed_error : float
@@ -50,7 +50,7 @@ class StepResult:
     qd: Array
     eps: Array
     status: Status
-    iterations: int
+    iterations: int | None
     active: tuple[str, ...]
     fixed_error: float
     bound_violation: float

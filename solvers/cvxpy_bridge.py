@@ -91,6 +91,7 @@ class CvxpyBridge(Solver):
 
     requires: ClassVar[tuple[str, ...]] = ("cvxpy",)
     handles_semidefinite: ClassVar[bool] = True
+    own_timer: ClassVar[str] = "what cvxpy passes on of its time: set-up and solve, as far as it says"
 
     def __init__(self, *, tolerance: float = 1e-9, settings: Mapping[str, object] | None = None) -> None:
         super().__init__(tolerance=tolerance)
@@ -171,9 +172,10 @@ class CvxpyBridge(Solver):
             y=y,
             z=z,
             z_box=z_box,
-            iterations=int((stats and stats.num_iters) or 0),
+            iterations=None if stats is None or stats.num_iters is None else int(stats.num_iters),
             certificate=FarkasCertificate(*vectors) if vectors and proof else None,
-            own_time=stats.solve_time if stats else None,
+            # A timer that reads zero was not started: PIQP behind cvxpy, which asks it for none.
+            own_time=(stats.solve_time or None) if stats else None,
             message="" if claimed is Status.SOLVED else f"{self.name} reports {word}.",
         )
 

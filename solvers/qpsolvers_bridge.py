@@ -30,9 +30,10 @@ class QpsolversBridge(Solver):
 
     qpsolvers has no set-up and no update: every solve hands over the whole problem, so a solver that could reuse its
     factorisation does not. `setup_time` is the time to convert the problem, `solve_time` that of qpsolvers' call,
-    its own conversions included. Iterations are 0 where qpsolvers does not pass the count on (daqp, highs, clarabel).
-    Claims of infeasibility come with a certificate where qpsolvers passes on what it takes (clarabel, osqp, piqp,
-    scs); the rest are claims only, or plain failures where qpsolvers does not say why nothing was found (daqp, highs).
+    its own conversions included. Iterations are None where qpsolvers does not pass the count on (daqp, highs,
+    clarabel). Claims of infeasibility come with a certificate where qpsolvers passes on what it takes (clarabel,
+    osqp, piqp, scs); the rest are claims only, or plain failures where qpsolvers does not say why nothing was found
+    (daqp, highs).
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ class QpsolversBridge(Solver):
             y=y,
             z=z,
             z_box=z_box,
-            iterations=self._known.iterations(answer.extras) if self._known.iterations and answer.extras else 0,
+            iterations=self._known.iterations(answer.extras) if self._known.iterations and answer.extras else None,
             certificate=self._certificate(qp, claimed, answer) if self._known.proves else None,
             own_time=self._known.own_time(answer.extras) if self._known.own_time and answer.extras else None,
             message=message,
@@ -206,6 +207,7 @@ def bridge(member: str) -> type[Solver]:
         name: ClassVar[str] = f"qpsolvers:{member}"
         handles_semidefinite: ClassVar[bool] = known.semidefinite
         detects_infeasibility: ClassVar[bool] = known.proves
+        own_timer: ClassVar[str] = "set-up and solve"
         starts: ClassVar[Mapping[str, Mapping[str, object]]] = {"solution": {"warm": True}} if known.initial else {}
 
         @classmethod

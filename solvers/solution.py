@@ -49,7 +49,7 @@ class RawSolution:
     y: npt.ArrayLike | None = None
     z: npt.ArrayLike | None = None
     z_box: npt.ArrayLike | None = None
-    iterations: int = 0
+    iterations: int | None = 0
     certificate: Certificate | None = None
     message: str = ""
     own_time: float | None = None
@@ -74,7 +74,7 @@ class Solution:
     claimed
         What the backend said.
     iterations
-        As the backend counts them.
+        As the backend counts them; None where it tells no count.
     setup_time, solve_time
         Time to set up or to update (whichever happened), and to solve [s].
     residuals
@@ -95,7 +95,7 @@ class Solution:
     z_box: Array
     status: Status
     claimed: Status
-    iterations: int
+    iterations: int | None
     setup_time: float
     solve_time: float
     residuals: Residuals

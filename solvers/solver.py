@@ -49,6 +49,8 @@ class Solver(ABC):
     handles_semidefinite: ClassVar[bool] = False
     #: Whether it recognises problems without a solution.
     detects_infeasibility: ClassVar[bool] = False
+    #: What the solver's own timer times, where it has one.
+    own_timer: ClassVar[str] = "the solve"
     #: How it can start other than from nothing, "active-set" (the last one) or "solution" (the last one), and the
     #: options of its constructor that make it.
     starts: ClassVar[Mapping[str, Mapping[str, object]]] = MappingProxyType({})

@@ -75,8 +75,8 @@ class Trial:
 
     @cached_property
     def iterations(self) -> tuple[int, ...]:
-        """Of each tick."""
-        return tuple(int(result.iterations) for result in self._results)
+        """Of each tick; empty where the solver tells none."""
+        return tuple(int(result.iterations) for result in self._results if result.iterations is not None)
 
     @cached_property
     def statuses(self) -> tuple[Status, ...]:

@@ -1,8 +1,10 @@
 """Metrics: a cell's two frames and its scenario summed up in one flat record, and records compared."""
 
+from .against import AgainstHand
 from .behaviour import AGREEMENT, Answers, Errors, Iterations, Motion
 from .intervals import Estimate
 from .motion import CHATTER_SHARE, JUMP_SHARE, ON_LIMIT
+from .possible import Possible
 from .ratios import SAME_PROBLEMS, RecordsError, geometric_means, performance_profile
 from .record import CellRecord, cell_record
 from .requirements import REQUIREMENTS, Requirement
@@ -17,6 +19,7 @@ __all__ = [
     "ON_LIMIT",
     "REQUIREMENTS",
     "SAME_PROBLEMS",
+    "AgainstHand",
     "Answers",
     "CellRecord",
     "CellTimes",
@@ -25,6 +28,7 @@ __all__ = [
     "FrameError",
     "Iterations",
     "Motion",
+    "Possible",
     "RecordsError",
     "Requirement",
     "Ticks",

@@ -46,7 +46,7 @@ class Iterations:
     def of(cls, ticks: Ticks) -> Iterations:
         """Sum up a cell's ticks."""
         counts = ticks.column("iterations")
-        known = bool(np.all(counts >= 0))
+        known = not np.isnan(counts).any()
         active = [frozenset(names or ()) for names in ticks.frame["active"].to_list()]
         in_order = [] if ticks.loop == "sampled" else pairwise(active)
         changes = np.array([len(a ^ b) for a, b in in_order], dtype=float)
@@ -126,6 +126,8 @@ class Errors:
         Largest velocity sent along a locked translation: m/s off the line [m/s].
     off_orientation : float
         Largest velocity sent about a locked axis [rad/s].
+    drift_offset, drift_turn : float or None
+        Furthest that the tool was from what its mode locks, since the mode began [m; rad]; None without a closed loop.
     task_error_linear, task_error_angular : float
         Mean norm of the Cartesian error's translations [m/s] and rotations [rad/s]; None where none is guided.
     task_scale_loss : float
@@ -140,6 +142,8 @@ class Errors:
     sent_excess: float
     off_line: float
     off_orientation: float
+    drift_offset: float | None
+    drift_turn: float | None
     task_error_linear: float | None
     task_error_angular: float | None
     task_scale_loss: float | None
@@ -162,6 +166,8 @@ class Errors:
             sent_excess=float(np.max(over, initial=0.0)),
             off_line=float(np.max(ticks.locked.linear)),
             off_orientation=float(np.max(ticks.locked.angular)),
+            drift_offset=float(np.max(ticks.locked.offset)) if ticks.closed_loop else None,
+            drift_turn=float(np.max(ticks.locked.turn)) if ticks.closed_loop else None,
             task_error_linear=linear if guided & {0, 1, 2} else None,
             task_error_angular=angular if guided & {3, 4, 5} else None,
             task_scale_loss=float(np.mean(loss)) if loss.size else None,

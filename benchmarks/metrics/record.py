@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
+from .against import AgainstHand
 from .behaviour import Answers, Errors, Iterations, Motion
 from .intervals import Estimate
 from .requirements import requirement_values
@@ -37,6 +38,7 @@ class CellRecord:
     answers : Answers
     errors : Errors
     motion : Motion
+    hand : AgainstHand
     requirement : dict of str to float
         The ten of the thesis, by key; see `REQUIREMENTS`.
     """
@@ -53,6 +55,7 @@ class CellRecord:
     answers: Answers
     errors: Errors
     motion: Motion
+    hand: AgainstHand
     requirement: dict[str, float | None]
 
     def flat(self) -> dict[str, str | int | float | None]:
@@ -110,6 +113,7 @@ def cell_record(
         answers=Answers.of(cell),
         errors=Errors.of(cell),
         motion=Motion.of(cell),
+        hand=AgainstHand.of(cell),
         requirement=requirement_values(cell),
     )
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Final
 import polars as pl
 import polars.selectors as cs
 
-from ..scenarios import get_scenario
+from .kept import record_of
 from .ratios import RecordsError
-from .record import cell_record
 from .requirements import REQUIREMENTS
 
 if TYPE_CHECKING:
@@ -17,25 +16,19 @@ if TYPE_CHECKING:
     from .requirements import Requirement
 
 _CONTROLLER: Final = ("formulation", "solver", "start")
-# Against the best on the same scenario: how much of the hand's motion limits and reach leave is the scenario's.
-_RELATIVE: Final = "workspace"
 
 
 def records(store: Store) -> pl.DataFrame:
     """Make the records of all cells of a sweep that have been run, one row each; see `CellRecord`.
+
+    They are kept in the folder, and made anew where a cell's files or this library have changed.
 
     Parameters
     ----------
     store : Store
         The results folder.
     """
-    rows = [
-        cell_record(
-            store.ticks(cell), store.times(cell), get_scenario(cell.scenario),
-            formulation=cell.formulation, solver=cell.solver, start=cell.start,
-        ).flat() | {"scenario": cell.scenario}
-        for cell in store.cells()
-    ]  # fmt: skip
+    rows = [record_of(store, cell) for cell in store.cells()]
     # What no cell has is a column of numbers all the same.
     return pl.DataFrame(rows, infer_schema_length=None).with_columns(cs.by_dtype(pl.Null).cast(pl.Float64))
 
@@ -62,7 +55,8 @@ def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
     Returns
     -------
     pl.DataFrame
-        One row per controller (`formulation`, `solver`, `start`) with `scenarios`, on how many it was run, and for each
+        One row per controller (`formulation`, `solver`, `start`; the last two of a baseline are "-") with `scenarios`,
+        on how many it was run, and for each
         of `REQUIREMENTS` its value in the scenario where it was worst, `KEY`; that scenario, `KEY_scenario`; and
         whether it passes, `KEY_pass`. Null where no scenario measures it: not measured is not passed. `passed` and
         `measured` count.
@@ -75,9 +69,7 @@ def scorecard_of(cells: pl.DataFrame) -> pl.DataFrame:
     for name in (*_CONTROLLER, "scenario", *(f"requirement_{each.key}" for each in REQUIREMENTS)):
         if name not in cells.columns:
             raise RecordsError(f"records: expected a column {name!r}, got {', '.join(cells.columns)}")
-    own = f"requirement_{_RELATIVE}"
     cells = cells.with_columns(cs.starts_with("requirement_").cast(pl.Float64))
-    cells = cells.with_columns(pl.col(own) / pl.col(own).max().over("scenario"))
     rows = []
     for key, group in cells.group_by(_CONTROLLER, maintain_order=True):
         row: dict[str, object] = dict(zip(_CONTROLLER, key, strict=True))

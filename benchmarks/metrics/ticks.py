@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from .motion import beyond, overshoot
+from .possible import Possible
 
 if TYPE_CHECKING:
     import polars as pl
@@ -211,6 +212,11 @@ class Ticks:
         if self.closed_loop:
             return overshoot(np.vstack([self.q, self.q_next[-1:]]), low, high)
         return float(np.max(beyond(self.q_next, low, high) - beyond(self.q, low, high), initial=0.0))
+
+    @cached_property
+    def possible(self) -> Possible:
+        """What the arm could have done at some of the ticks."""
+        return Possible.of(self)
 
     @cached_property
     def locked(self) -> LockedRows:

@@ -59,6 +59,8 @@ _MAIN: Final = (
     Column("iterations_max", "iter. max", "", "main", "int", "Most iterations of any tick."),
     Column("peak_acceleration", "peak accel.", "of limit", "main", "number",
            "Largest joint acceleration over its limit, of all joints."),
+    Column("against", "against hand", "ticks", "main", "int",
+           "Ticks at which the tool moves against the hand: v . (v + eps) < 0.", 0.0),
     Column("task_scale_loss", "pull lost", "%", "main", "percent",
            "Mean share of the hand's velocity that is not made, while it pulls."),
     Column("reference_error_max", "off reference", "rad/s", "main", "number",
@@ -95,6 +97,9 @@ _ERRORS: Final = (
     Column("off_line", "off the line", "m/s", "errors", "number", "Largest velocity sent along a locked translation."),
     Column("off_orientation", "off orientation", "rad/s", "errors", "number",
            "Largest velocity sent about a locked axis."),
+    Column("drift_offset", "drift", "m", "errors", "number",
+           "Furthest that the tool was from what its mode locks, since the mode began."),
+    Column("drift_turn", "drift", "rad", "errors", "number", "The same of its orientation."),
     Column("not_finite", "not finite", "%", "errors", "percent", "Ticks whose proposal was not finite.", 0.0),
     Column("task_error_linear", "task error", "m/s", "errors", "number",
            "Mean norm of the Cartesian error, translations."),
@@ -116,6 +121,18 @@ _MOTION: Final = (
     Column("jumps", "jumps", "1/s", "motion", "number",
            "Ticks at which a joint's command changes by more than 2 qdd_max dt."),
     Column("sigma_min", "\u03c3 min", "", "motion", "number", "Smallest singular value of the guided rows met."),
+)  # fmt: skip
+_HAND: Final = (
+    Column("against", "against hand", "ticks", "hand", "int",
+           "Ticks at which the tool moves against the hand: v . (v + eps) < 0.", 0.0),
+    Column("against_speed", "speed", "m/s, rad/s", "hand", "number", "Largest speed against the hand."),
+    Column("against_share", "share", "%", "hand", "percent", "The same over the hand's speed, while it pulls."),
+    Column("against_correction", "correcting", "ticks", "hand", "int", "While the locked rows are to move."),
+    Column("against_stop", "stopping", "ticks", "hand", "int", "Of the rest, with the safe stop."),
+    Column("against_limit", "braking hard", "ticks", "hand", "int",
+           "Of the rest, slower than before, a joint at its acceleration limit."),
+    Column("against_slowing", "braking gently", "ticks", "hand", "int", "Slower than before, no joint at that limit."),
+    Column("against_choice", "of its own", "ticks", "hand", "int", "All others: new, or growing.", 0.0),
 )  # fmt: skip
 
 
@@ -168,4 +185,4 @@ def _requirements() -> tuple[Column, ...]:
     )  # fmt: skip
 
 
-COLUMNS: Final = (*_MAIN, *_times(), *_ITERATIONS, *_ANSWERS, *_ERRORS, *_MOTION, *_requirements())
+COLUMNS: Final = (*_MAIN, *_times(), *_ITERATIONS, *_ANSWERS, *_ERRORS, *_MOTION, *_HAND, *_requirements())

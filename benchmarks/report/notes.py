@@ -65,7 +65,10 @@ def limitations(manifest: Manifest, cases: Sequence[Case], buckets: int) -> list
     if untimed:
         found.append(f"Not timed yet: {_some(untimed)}.")
     notes = Counter(
-        (case.cell.solver, note) for case in cases if case.outcome.timing for note in case.outcome.timing.notes
+        ("baselines" if case.cell.is_baseline else case.cell.solver, note)
+        for case in cases
+        if case.outcome.timing
+        for note in case.outcome.timing.notes
     )
     found += [f"{solver}: {note}." for solver, note in sorted(notes)]
     return found + [f"Left out of the sweep: {what}: {why}." for what, why in manifest.skipped.items()]

@@ -106,12 +106,13 @@ def _data(
     cases: Sequence[Case], cells: list[dict[str, Any]], keys: list[str], profiles: Mapping[str, Profile]
 ) -> dict[str, Any]:
     formulations = list(dict.fromkeys(case.cell.formulation for case in cases))
-    solvers = list(dict.fromkeys(case.cell.solver for case in cases))
+    solvers = list(dict.fromkeys(case.cell.solver for case in cases if not case.cell.is_baseline))
     present = {case.cell.start for case in cases}
     scenarios = {case.cell.scenario: case.scenario for case in cases}
     return {
         "scenarios": [_scenario(name, scenario) for name, scenario in scenarios.items()],
         "formulations": formulations,
+        "baselines": list(dict.fromkeys(case.cell.formulation for case in cases if case.cell.is_baseline)),
         "solvers": solvers,
         "starts": [start for start in STARTS if start in present],
         "start_names": _START_NAMES,
@@ -121,7 +122,7 @@ def _data(
         "first_measure": "wall_p50" if "wall_p50" in keys else (keys or [""])[0],
         "cells": cells,
         "profiles": {name: _profile(one) for name, one in profiles.items()},
-        "baseline": competitor(solvers[0], "cold"),
+        "baseline": competitor(solvers[0], "cold") if solvers else "",
     }
 
 
@@ -184,7 +185,12 @@ def _render(
     template = environment.from_string((assets / "page.html.j2").read_text(encoding="utf-8"))
     # A name in a configuration may be anything; it must not end the script element that it lies in.
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    names = [len(data[key]) for key in ("formulations", "solvers", "scenarios")]
+    baselines = len(data["baselines"])
+    names = [len(data["formulations"]) - baselines, len(data["solvers"]), len(data["scenarios"])]
+    what = f"{names[0]} formulations \u00d7 {names[1]} solvers"
+    what += (
+        f", and {baselines} baselines, \u00d7 {names[2]} scenarios" if baselines else f" \u00d7 {names[2]} scenarios"
+    )
     count = {
         state: sum(cell["state"] == state for cell in cells)
         for state in ("failed", "dishonest", "unsolved", "not run", "ok")
@@ -197,10 +203,9 @@ def _render(
         if cell["state"] != "ok"
     ]
     return template.render(
-        title=f"kinqp: {names[0]} formulations, {names[1]} solvers, {names[2]} scenarios",
+        title=f"kinqp: {what}",
         heading="Resolving a hand-guided arm's motion, measured",
-        lead=f"{names[0]} formulations \u00d7 {names[1]} solvers \u00d7 {names[2]} scenarios in {len(cells):,} cells, "
-        "measured on "
+        lead=f"{what} in {len(cells):,} cells, measured on "
         f"{conditions.get('cpu', 'an unknown CPU')}, {conditions.get('date', 'at an unknown date')}.",
         tiles=_tiles(len(cells), count, rows),
         score=rows,
@@ -230,7 +235,7 @@ def _tiles(total: int, count: dict[str, int], rows: Sequence[object]) -> list[di
         return "bad" if count[state] else "good"
 
     return [
-        tile(total, "cells", "Scenario x formulation x solver x start."),
+        tile(total, "cells", "Scenario x formulation x solver x start, and scenario x baseline."),
         tile(
             count["ok"],
             "right at every tick",
@@ -247,6 +252,6 @@ def _tiles(total: int, count: dict[str, int], rows: Sequence[object]) -> list[di
             bad("dishonest"),
         ),
         tile(count["failed"], "failed", "Could not be run: crashed, too slow, or not applicable.", bad("failed")),
-        tile(len(rows), "controllers scored", "Formulation x solver x start."),
+        tile(len(rows), "controllers scored", "Formulation x solver x start, and baselines."),
         *([tile(count["not run"], "not run yet", "The sweep has not come to them.")] if count["not run"] else []),
     ]

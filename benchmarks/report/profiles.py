@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import polars as pl
 
+from ..cells import NONE
 from ..metrics import geometric_means, performance_profile
 
 if TYPE_CHECKING:
@@ -75,6 +76,8 @@ def competitor(solver: str, start: str) -> str:
 def profile(records: pl.DataFrame, column: str, starts: Sequence[str]) -> Profile | None:
     """Set solvers, each with each of its starts, against each other on all scenarios and formulations.
 
+    Baselines have no solver, and nobody else solves what they do: they have no part in it.
+
     Parameters
     ----------
     records : pl.DataFrame
@@ -92,12 +95,11 @@ def profile(records: pl.DataFrame, column: str, starts: Sequence[str]) -> Profil
     if column not in records.columns:
         return None
     # A timer too coarse for a solve reads zero, which has no ratio.
-    cells = records.with_columns(
+    cells = records.filter(pl.col("solver") != NONE).with_columns(
         pl.when(pl.col(column) > 0.0).then(pl.col(column)).alias(column),
-        pl.Series(
-            _BY, [competitor(*names) for names in records.select("solver", "start").iter_rows()], dtype=pl.String
-        ),
     )
+    names = [competitor(*names) for names in cells.select("solver", "start").iter_rows()]
+    cells = cells.with_columns(pl.Series(_BY, names, dtype=pl.String))
     timed = cells.filter(pl.col(column).is_not_null())[_BY].unique(maintain_order=True).to_list()
     cells = cells.filter(pl.col(_BY).is_in(timed))
     if not timed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from ..cells import NONE
 from ..metrics import REQUIREMENTS, scorecard_of
 
 if TYPE_CHECKING:
@@ -42,6 +43,11 @@ class Row:
     passed: int
     measured: int
     marks: tuple[Mark, ...]
+
+    @property
+    def is_baseline(self) -> bool:
+        """Whether it is a baseline, without solver and start."""
+        return self.solver == NONE
 
 
 def scorecard_rows(records: pl.DataFrame) -> list[Row]:

@@ -45,7 +45,8 @@ def curves(ticks: pl.DataFrame | None, times: pl.DataFrame | None, scenario: Sce
     drawn: dict[str, Any] = {}
     if ticks is not None and len(ticks):
         tick = positions(ticks, scenario)
-        drawn["iterations"] = _curve(tick, ticks["iterations"].to_numpy(), buckets)
+        if not ticks["iterations"].has_nulls():
+            drawn["iterations"] = _curve(tick, ticks["iterations"].to_numpy(), buckets)
         drawn["sigma"] = _curve(tick, ticks["sigma_min"].to_numpy(), buckets)
         drawn["scale"] = _curve(tick, ticks["task_scale"].to_numpy(), buckets)
         acceleration = acceleration_share(ticks, scenario)

@@ -38,6 +38,11 @@ def available_scenarios() -> tuple[str, ...]:
     return _REGISTRY.names()
 
 
+def is_builtin(name: str) -> bool:
+    """Whether a scenario is one of the library's own."""
+    return name in _REGISTRY.builtin
+
+
 def get_scenario(scenario: str | Scenario) -> Scenario:
     """Find a scenario by registered name or ``module:Name``; an instance is returned as it is.
 

@@ -41,8 +41,8 @@ class Found:
     status : str
     active : list of str
         Rows that hold the command back, by name.
-    seconds : float
-        Of a tick, where and when it was found [s].
+    seconds : float or None
+        Of a tick, where and when it was found [s]; None where the search was ended before it came to timing.
     """
 
     q: list[float]
@@ -52,10 +52,10 @@ class Found:
     iterations: int
     status: str
     active: list[str]
-    seconds: float
+    seconds: float | None
 
     @classmethod
-    def of(cls, step: CompiledStep, state: Batch, seconds: float) -> Found:
+    def of(cls, step: CompiledStep, state: Batch, seconds: float | None) -> Found:
         """Describe a state, a batch of one."""
         inputs = {**state.limits, **({"qd_prev": state.qd_prev[0]} if "qd_prev" in step.inputs else {})}
         result = step(state.q[0], state.v[0], **inputs)
@@ -89,9 +89,9 @@ class WorstCase:
     most : Found
         The state with most iterations.
     slowest : Found
-        The one whose tick takes longest.
-    median : float
-        Time of a typical tick, in the same run [s].
+        The one whose tick takes longest; `most` once more where ticks were not timed.
+    median : float or None
+        Time of a typical tick, in the same run [s]; None where ticks were not timed.
     statuses : dict of str to int
         How the ticks of the search ended.
     ticks, seed : int
@@ -106,7 +106,7 @@ class WorstCase:
     mode: str
     most: Found
     slowest: Found
-    median: float
+    median: float | None
     statuses: dict[str, int]
     ticks: int
     seed: int

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -46,6 +46,7 @@ def search(
     ticks: int = 1_000_000,
     seed: int = 0,
     on_progress: Callable[[int, int, int], None] | None = None,
+    on_found: Callable[[WorstCase], None] | None = None,
 ) -> WorstCase:
     """Search for the state with most iterations and for the slowest tick.
 
@@ -62,6 +63,8 @@ def search(
         The same seed finds the same states by iterations; times are the machine's.
     on_progress : callable, optional
         A KeyboardInterrupt raised in it, or anywhere here, ends the search with what was found so far.
+    on_found : callable, optional
+        Called with the case before anything is timed, which may take as long as the search: to be written down.
 
     Returns
     -------
@@ -95,22 +98,33 @@ def search(
         if not kept:
             raise
         interrupted = True
-    watch, most = Stopwatch(step, seed), kept[0].state
-    slowest, median = _slowest(watch, draws, [each.state for each in kept], 0 if interrupted else _ROUNDS)
-    seconds, again = watch.seconds([most, slowest])
-    return WorstCase(
+    most = Found.of(step, kept[0].state, None)
+    found = WorstCase(
         robot=step.robot.name,
         tip=None,
         formulation=step.formulation.name,
         mode=str(step.mode),
-        most=Found.of(step, most, seconds),
-        slowest=Found.of(step, slowest, again),
-        median=median,
+        most=most,
+        slowest=most,
+        median=None,
         statuses=dict(statuses),
         ticks=done,
         seed=seed,
         conditions=conditions(),
     )
+    if on_found is not None:
+        on_found(found)
+    try:
+        return _timed(found, step, draws, kept, 0 if interrupted else _ROUNDS)
+    except KeyboardInterrupt:
+        return found
+
+
+def _timed(found: WorstCase, step: CompiledStep, draws: Draws, kept: list[_Kept], rounds: int) -> WorstCase:
+    watch, most = Stopwatch(step, found.seed), kept[0].state
+    slowest, median = _slowest(watch, draws, [each.state for each in kept], rounds)
+    seconds, again = watch.seconds([most, slowest])
+    return replace(found, most=Found.of(step, most, seconds), slowest=Found.of(step, slowest, again), median=median)
 
 
 def _slowest(watch: Stopwatch, draws: Draws, worst: list[Batch], rounds: int) -> tuple[Batch, float]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from kinqp.benchmarks import Block, Cell, SweepConfig
-from kinqp.benchmarks.accuracy import PreparedBlock, task_scale
+from kinqp.benchmarks.accuracy import PreparedBlock
+from kinqp.benchmarks.loop import task_scale
 from kinqp.control import make_step, simulate
 from tests.benchmarks.tiny import three_states, tiny, two_phases
 

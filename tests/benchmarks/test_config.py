@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from kinqp.baselines import available_baselines
 from kinqp.benchmarks import Cell, ConfigError, SweepConfig, available_scenarios, cells_of, load_config, make_config
 from kinqp.formulations import available_formulations
 from kinqp.solvers import available_solvers
@@ -29,6 +30,19 @@ def test_all_means_all_there_are() -> None:
     assert config.scenarios == available_scenarios()
     assert config.formulations == available_formulations()
     assert config.solvers == (*available_solvers(bridges=True), "piqp(tolerance=1e-8)")
+
+
+def test_a_baseline_is_a_cell_without_solver_and_start() -> None:
+    config = make_config({"baselines": ["all", "task-priority(limits=none)"], "formulations": [], "starts": ["cold"]})
+    assert config.baselines == (*available_baselines(), "task-priority(limits=none)")
+    assert cells_of(config) == tuple(Cell("semicircle", name, "-", "-") for name in config.baselines)
+    assert all(cell.is_baseline and cell.block.baseline for cell in cells_of(config))
+    both = cells_of(make_config({"baselines": ["task-priority"], "formulations": ["damped"], "solvers": ["piqp"]}))
+    assert [cell.is_baseline for cell in both] == [False, True]
+    assert str(both[-1]) == "semicircle / task-priority"
+    # A formulation of somebody's may have the same name.
+    named_alike = Cell("a", "task-priority", "piqp")
+    assert Cell.of_baseline("a", "task-priority").block.file_stem != named_alike.block.file_stem
 
 
 def test_starts_are_those_that_a_solver_has() -> None:
@@ -75,11 +89,14 @@ def test_the_shipped_sweep_is_found_anywhere(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"solver": ["piqp"]}, r"expected keys among .*scenarios, formulations, solvers, .*got 'solver'"),
+        ({"solver": ["piqp"]}, r"expected keys among .*scenarios, baselines, formulations, solvers, .*got 'solver'"),
         ({"solvers": ["clarable"]}, "solvers: solver 'clarable' does not exist.*did you mean 'clarabel'"),
         ({"solvers": ["clarabel(tolerence=1)"]}, "'tolerence' does not exist.*did you mean 'tolerance'"),
         ({"formulations": ["joint_space"]}, "formulation 'joint_space' does not exist.*did you mean 'joint-space'"),
         ({"formulations": ["cartesian-error(bounds=loose)"]}, "bounds: expected one of thesis, viable, got 'loose'"),
+        ({"baselines": ["task_priority"]}, "baselines: baseline 'task_priority' does not exist.*did you mean 'task-p"),
+        ({"baselines": ["task-priority(limit=none)"]}, "baselines: .*'limit' does not exist.*did you mean 'limits'"),
+        ({"formulations": []}, "formulations: expected at least one of .*, or 'all', got an empty list and no basel"),
         ({"scenarios": ["circle"]}, "scenario 'circle' does not exist"),
         ({"solvers": []}, "solvers: expected at least one of active-set, .*, or 'all', got an empty list"),
         ({"starts": []}, "starts: expected at least one of cold, active-set, solution, got an empty list"),

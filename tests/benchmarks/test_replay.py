@@ -95,7 +95,7 @@ def test_a_cell_keeps_its_three_clocks_apart() -> None:
         assert (frame["wall_setup"].is_null() == frame["wall_update"].is_not_null()).all()
         for name, has in (("own", own), ("c", c)):
             assert frame[name].null_count() == (0 if has else len(frame)), (solver, name)
-            assert any(note.startswith(name) for note in part.notes) is not has
+            assert any(note.startswith(f"{name} is null") for note in part.notes) is not has
             if has:
                 assert (frame[name] > 0.0).all()
 

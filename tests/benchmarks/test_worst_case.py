@@ -58,6 +58,39 @@ def test_an_interrupted_search_keeps_what_it_has(step: CompiledStep) -> None:
     assert cut.most.iterations >= 1
 
 
+def test_what_is_found_is_handed_over_before_it_is_timed_and_timing_may_be_ended(
+    step: CompiledStep, found: WorstCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    early: list[WorstCase] = []
+    monkeypatch.setattr(Stopwatch, "seconds", interrupted)
+    cut = search(step, ticks=TICKS, seed=3, on_found=early.append)
+    assert early == [cut]
+    assert (cut.most.q, cut.most.iterations, cut.ticks) == (found.most.q, found.most.iterations, TICKS)
+    assert (cut.median, cut.most.seconds, cut.slowest) == (None, None, cut.most)
+    write_case(cut, tmp_path / "case.json")
+    assert read_case(tmp_path / "case.json") == cut
+
+
+def test_ctrl_c_while_timing_leaves_the_search_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = tmp_path / "worst.json"
+    seen: list[WorstCase] = []
+
+    def interrupted(*_: object) -> None:
+        seen.append(read_case(out))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Stopwatch, "seconds", interrupted)
+    words = ["worst-case", "--robot", "lbr_med14", "--formulation", "joint-space", "--ticks", "20000"]
+    done = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    assert "Interrupted before ticks were timed" in done.output
+    assert [case.most.iterations for case in seen] == [read_case(out).most.iterations]
+    assert (seen[0].robot, seen[0].formulation) == ("lbr_med14", "joint-space")
+
+
 def test_a_case_is_shown_again_from_its_file(found: WorstCase, tmp_path: Path) -> None:
     write_case(found, tmp_path / "case.json")
     case = read_case(tmp_path / "case.json")

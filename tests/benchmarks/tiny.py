@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import itertools
 import os
+import resource
 import signal
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -18,6 +21,9 @@ from kinqp.solvers.solution import RawSolution
 
 if TYPE_CHECKING:
     from kinqp.solvers import QP
+
+
+HERE_TINY = "tests.benchmarks.tiny:tiny"
 
 
 def tiny() -> Scenario:
@@ -93,6 +99,55 @@ class CrashingLate(Delegating):
     def before(self, call: int) -> None:
         if call == 30:
             os.kill(os.getpid(), signal.SIGSEGV)
+
+
+class Killed(Delegating):
+    """Is what the kernel ends when memory runs out."""
+
+    def before(self, call: int) -> None:
+        if call == 10:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+# More than is left over from what a run takes, and little enough for any machine [bytes].
+ROOM = 256 * 2**20
+
+
+class Hungry(Delegating):
+    """Takes all the memory that it is given, until there is none; `at` is the call that does."""
+
+    at: ClassVar[int] = 10
+
+    def before(self, call: int) -> None:
+        if call == self.at:
+            _leave(ROOM)
+            eaten = []
+            while True:
+                eaten.append(np.ones(2**20))
+
+
+class HungryLate(Hungry):
+    """The same once it is timed."""
+
+    at: ClassVar[int] = 30
+
+
+class HungryInC(Delegating):
+    """The same in a library that does not expect to be given nothing, and writes there all the same."""
+
+    def before(self, call: int) -> None:
+        if call == 10:
+            _leave(ROOM)
+            c = ctypes.CDLL(None)
+            c.malloc.restype, c.memset.argtypes = ctypes.c_void_p, (ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t)
+            while True:
+                c.memset(c.malloc(ctypes.c_size_t(2**24)), 1, 2**24)
+
+
+def _leave(room: int) -> None:
+    """Limit this process's memory to what it has and some more [bytes]."""
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + room, resource.RLIM_INFINITY))
 
 
 class Hanging(Delegating):

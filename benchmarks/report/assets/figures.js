@@ -58,14 +58,15 @@ const escapeText = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
 // What is compared now: [{name, cell, curves, colour, dash}], of cells that are shown and hold something.
 async function chosen() {
   const names = REPORT[state.by];
-  const wanted = names.filter((name) => state.shown[state.by].has(name));
+  const alone = state.by === "solvers" && isBaseline(state.formulation);
+  const wanted = alone ? [NONE] : names.filter((name) => state.shown[state.by].has(name));
   const found = [];
   for (const name of wanted) {
-    const cell = state.by === "solvers" ? cellOf(state.scenario, state.formulation, name, startFor(state.formulation, name))
-      : cellOf(state.scenario, name, state.solver, startFor(name, state.solver));
+    const cell = state.by === "solvers" ? controllerOf(state.scenario, state.formulation, name, startFor(state.formulation, name))
+      : controllerOf(state.scenario, name, state.solver, startFor(name, state.solver));
     if (!cell) continue;
-    const style = REPORT.styles[state.by][name];
-    const label = cell.start === state.start ? name : `${name} (${cell.start})`;
+    const style = alone ? REPORT.styles.formulations[state.formulation] : REPORT.styles[state.by][name];
+    const label = cell.solver === NONE ? cell.formulation : cell.start === state.start ? name : `${name} (${cell.start})`;
     found.push({ name: label, cell, curves: await curvesOf(cell), colour: style[0], dash: style[1] });
   }
   return found;

@@ -4,7 +4,7 @@ function drawOverview() {
   const solver = byId("map-solver").value, start = byId("map-start").value;
   const scenarios = REPORT.scenarios.map((one) => one.name);
   const of = (formulation, scenario) => {
-    const cell = cellOf(scenario, formulation, solver, start);
+    const cell = controllerOf(scenario, formulation, solver, start);
     return cell && cell.values ? cell.values[column.at] : null;
   };
   const rows = REPORT.formulations.filter((formulation) => scenarios.some((name) => of(formulation, name) !== null));
@@ -70,7 +70,8 @@ function filterScore() {
   const table = byId("score-table");
   if (!table) return;
   for (const row of table.tBodies[0].rows) {
-    row.hidden = [["solver", "score-solver"], ["start", "score-start"]].some(
+    // What solver and start are chosen is nothing to a baseline.
+    row.hidden = row.dataset.solver !== NONE && [["solver", "score-solver"], ["start", "score-start"]].some(
       ([key, id]) => byId(id).value && row.dataset[key] !== byId(id).value);
   }
 }

@@ -21,6 +21,7 @@ function fillControls() {
   fillChips();
 }
 function has(name) {
+  if (state.by === "formulations" && isBaseline(name)) return Boolean(cellOf(state.scenario, name, NONE, NONE));
   return REPORT.starts.some((start) => (state.by === "solvers" ? cellOf(state.scenario, state.formulation, name, start)
     : cellOf(state.scenario, name, state.solver, start)));
 }
@@ -92,8 +93,9 @@ function start() {
   }
   options(byId("only-scenario"), every(REPORT.scenarios.map((one) => one.name)), "");
   options(byId("only-formulation"), every(REPORT.formulations), "");
-  options(byId("only-solver"), every(REPORT.solvers), "");
-  options(byId("only-start"), every(REPORT.starts), "");
+  const none = REPORT.baselines.length ? [NONE] : [];
+  options(byId("only-solver"), every([...REPORT.solvers, ...none]), "");
+  options(byId("only-start"), every([...REPORT.starts, ...none]), "");
   options(byId("only-state"), every([...new Set(REPORT.cells.map((cell) => cell.state))]), "");
   options(byId("group"), [...new Set(REPORT.columns.map((column) => column.group)), "all"], REPORT.columns[0] && REPORT.columns[0].group);
   for (const key of FIXED.map(([name]) => name)) byId("only-" + key).addEventListener("change", refreshTable);
@@ -105,7 +107,8 @@ function start() {
     const row = event.target.closest("tr");
     if (!row) return;
     const cell = REPORT.cells.find((one) => one.id === Number(row.dataset.cell));
-    select({ scenario: cell.scenario, formulation: cell.formulation, solver: cell.solver, start: cell.start, by: "solvers" }, true);
+    const own = cell.solver === NONE ? {} : { solver: cell.solver, start: cell.start };
+    select({ scenario: cell.scenario, formulation: cell.formulation, ...own, by: "solvers" }, true);
   });
   byId("theme").addEventListener("click", () => {
     setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");

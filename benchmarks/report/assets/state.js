@@ -13,6 +13,12 @@ const cellsByKey = new Map(
 const cellOf = (scenario, formulation, solver, start) =>
   cellsByKey.get([scenario, formulation, solver, start].join("\n"));
 
+// A baseline has neither solver nor start: whichever of them is selected, it has the same cell.
+const NONE = "-";
+const isBaseline = (formulation) => REPORT.baselines.includes(formulation);
+const controllerOf = (scenario, formulation, solver, start) =>
+  isBaseline(formulation) ? cellOf(scenario, formulation, NONE, NONE) : cellOf(scenario, formulation, solver, start);
+
 const state = {
   scenario: REPORT.scenarios[0].name, by: "solvers", formulation: REPORT.formulations[0], solver: REPORT.solvers[0],
   start: REPORT.starts[0], clock: REPORT.clocks[0].name, shown: { solvers: null, formulations: null },

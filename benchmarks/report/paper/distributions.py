@@ -35,7 +35,14 @@ def distributions_figure(series: Sequence[Series]) -> Figure | None:
     made, axes = figure(len(formulations), len(clocks), 1.7, sharey="all", sharex="col")
     for (cell, clock), (one, (shares, at)) in curves.items():
         axis = axes[formulations.index(cell.formulation)][clocks.index(clock)]
-        axis.step(at, shares, where="post", color=one.colour, linestyle=DASHES[one.dash], label=cell.solver)
+        axis.step(
+            at,
+            shares,
+            where="post",
+            color=one.colour,
+            linestyle=DASHES[one.dash],
+            label=cell.formulation if cell.is_baseline else cell.solver,
+        )
     for row, formulation in enumerate(formulations):
         axes[row][0].set_ylabel(f"{formulation}\nshare of solves")
     for column, clock in enumerate(clocks):

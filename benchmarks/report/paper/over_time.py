@@ -25,7 +25,7 @@ def iterations_figure(series: Sequence[Series], scenario: Scenario) -> Figure | 
     """Iterations per tick, one panel per formulation and solver (figure 4.6); None where nothing was run."""
 
     def curve(one: Series) -> Curve | None:
-        if one.ticks is None or not len(one.ticks):
+        if one.ticks is None or not len(one.ticks) or one.ticks["iterations"].has_nulls():
             return None
         values = one.ticks["iterations"].to_numpy().astype(float)
         at = extremes(values, BUCKETS)
@@ -77,7 +77,7 @@ def _grid(
             axis.plot(x, values, color=one.colour, linewidth=0.6)
         else:
             axis.plot(x, values, ".", color=one.colour, markersize=2.5, markeredgewidth=0.0)
-        axis.set_title(f"{cell.formulation}, {cell.solver}", loc="left")
+        axis.set_title(cell.formulation if cell.is_baseline else f"{cell.formulation}, {cell.solver}", loc="left")
         if kind == "times":
             axis.set_yscale("log")
         if row == len(solvers) - 1:

@@ -24,7 +24,7 @@ class Selection:
     scenarios : tuple of str
         All without.
     formulations : tuple of str
-        Without: the thesis's two where the sweep has them, or its first two.
+        And baselines. Without: the thesis's two where the sweep has them, or its first two.
     solvers : tuple of str
         Without: the sweep's first four.
     start : str
@@ -44,16 +44,22 @@ class Selection:
             ("solver", self.solvers),
             ("start", (self.start,)),
         ):
-            there = list(dict.fromkeys(getattr(case.cell, what) for case in cases))
+            solved = [case for case in cases if not case.cell.is_baseline]
+            some = solved if what in ("solver", "start") else cases
+            there = list(dict.fromkeys(getattr(case.cell, what) for case in some))
+            if what == "start" and not there:
+                continue  # baselines alone, which have none
             for name in wanted:
                 if name not in there:
                     raise ValueError(f"{what}: expected one of the sweep's ({', '.join(there)}), got {name!r}")
 
     def of(self, cases: Sequence[Case]) -> Selection:
         """Fill in what was left empty."""
+        solved = [case for case in cases if not case.cell.is_baseline]
         names = {
-            what: list(dict.fromkeys(getattr(case.cell, what) for case in cases))
-            for what in ("scenario", "formulation", "solver")
+            "scenario": list(dict.fromkeys(case.cell.scenario for case in cases)),
+            "formulation": list(dict.fromkeys(case.cell.formulation for case in solved or cases)),
+            "solver": list(dict.fromkeys(case.cell.solver for case in solved)),
         }
         thesis = [name for name in ("cartesian-error", "joint-space") if name in names["formulation"]]
         return Selection(

@@ -50,13 +50,13 @@ def write_figures(
         Called with (scenarios done, in all).
     """
     chosen = selection.of(cases)
-    solvers = list(dict.fromkeys(case.cell.solver for case in cases))
+    solvers = list(dict.fromkeys(case.cell.solver for case in cases if not case.cell.is_baseline))
     formulations = list(dict.fromkeys(case.cell.formulation for case in cases))
     looks = styles(solvers), styles(formulations)
     written: list[Path] = []
     with style():
         for number, name in enumerate(chosen.scenarios):
-            some = [case for case in cases if case.cell.scenario == name and case.cell.start == chosen.start]
+            some = [case for case in cases if case.cell.scenario == name]
             for kind, made in _of_scenario(some, chosen, *looks):
                 written += save(made, folder / f"{_plain(name)}-{kind}")
             if on_progress is not None:
@@ -64,7 +64,7 @@ def write_figures(
         overall = {clock: profiles[f"{clock}_p50"] for clock in CLOCKS if f"{clock}_p50" in profiles}
         for kind, figure in (
             ("performance-profile", profile_figure(overall, looks[0])),
-            ("scorecard", scorecard_figure(_first_solver(scorecard_rows(records), chosen))),
+            ("scorecard", scorecard_figure(_scored(scorecard_rows(records), chosen))),
         ):
             written += [] if figure is None else save(figure, folder / kind)
     return written
@@ -77,15 +77,21 @@ def _of_scenario(
     formulation_looks: Mapping[str, tuple[str, str]],
 ) -> list[tuple[str, Figure]]:
     by_solver = [
-        Series(case, case.ticks(), case.times(), *solver_looks[case.cell.solver])
+        Series(
+            case,
+            case.ticks(),
+            case.times(),
+            *(formulation_looks[case.cell.formulation] if case.cell.is_baseline else solver_looks[case.cell.solver]),
+        )
         for case in cases
-        if case.cell.formulation in chosen.formulations and case.cell.solver in chosen.solvers
+        if case.cell.formulation in chosen.formulations
+        and (case.cell.is_baseline or (case.cell.solver in chosen.solvers and case.cell.start == chosen.start))
     ]
     # At limits and singularities it is formulations that differ: solvers of one all answer the same.
     by_formulation = [
         Series(one.case, one.ticks, one.times, *formulation_looks[one.case.cell.formulation])
         for one in by_solver
-        if one.case.cell.solver == chosen.solvers[0]
+        if one.case.cell.is_baseline or one.case.cell.solver == chosen.solvers[0]
     ]
     if not by_solver:
         return []
@@ -99,8 +105,8 @@ def _of_scenario(
     return [(kind, figure) for kind, figure in made.items() if figure is not None]
 
 
-def _first_solver(rows: Sequence[Row], chosen: Selection) -> list[Row]:
-    return [row for row in rows if row.solver == chosen.solvers[0] and row.start == chosen.start]
+def _scored(rows: Sequence[Row], chosen: Selection) -> list[Row]:
+    return [row for row in rows if row.is_baseline or (row.solver == chosen.solvers[0] and row.start == chosen.start)]
 
 
 def _plain(name: str) -> str:

@@ -20,6 +20,7 @@ CONFIG = {
     "formulations": ["cartesian-error", "joint-space"],
     "solvers": ["active-set", "clarabel", HERE + "Lying"],
     "starts": ["cold", "active-set"],
+    "baselines": ["gradient-projection", "task-priority"],
     # A crash takes a worker process with it, and starting another takes longer than all of these cells.
     "more": [{"scenarios": [HERE + "tiny"], "formulations": ["joint-space"], "solvers": [HERE + "Crashing"]}],
     "repeats": 5,

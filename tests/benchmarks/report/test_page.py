@@ -153,7 +153,9 @@ def test_the_selectors_change_what_is_drawn(opened: Chrome) -> None:
     choose(opened, "scenario", TINY + "two_phases")
     assert max(max(one["x"]) for one in traces(opened, "iterations")) == pytest.approx(0.013)
     choose(opened, "by", "formulations")
-    assert {one["name"] for one in traces(opened, "iterations")} == {"cartesian-error", "joint-space"}
+    assert {one["name"] for one in traces(opened, "iterations")} == {
+        "cartesian-error", "joint-space", "gradient-projection", "task-priority",
+    }  # fmt: skip
     choose(opened, "scenario", TINY + "three_states")
     assert all(one["x"] == [0, 1, 2] for one in traces(opened, "iterations"))
     assert traces(opened, "phase") == []
@@ -217,6 +219,24 @@ def test_a_row_leads_to_its_figures(opened: Chrome) -> None:
     assert opened.find_element("id", "formulation").get_property("value") == "joint-space"
 
 
+def test_a_baseline_is_shown_by_its_name_whatever_solver_is_chosen(opened: Chrome, swept: Store) -> None:
+    shown_filter(opened, "tiny:tiny task-priority")
+    assert column(opened, "solver") == column(opened, "start") == ["-"]
+    at = turn(opened)
+    opened.execute_script("document.querySelector('#cells-table tbody tr').click()")
+    drawn(opened, at + 1)
+    assert opened.find_element("id", "formulation").get_property("value") == "task-priority"
+    (shown,) = traces(opened, "iterations")
+    (cell,) = (one for one in swept.cells() if one.scenario == TINY + "tiny" and one.formulation == "task-priority")
+    assert (shown["name"], shown["y"]) == ("task-priority", swept.ticks(cell)["iterations"].to_list())
+    assert [one["name"] for one in traces(opened, "cdf")] == ["task-priority"]
+    assert "task-priority" not in {one["name"] for one in traces(opened, "profile")}
+    for solver in ("active-set", "clarabel"):
+        choose(opened, "map-solver", solver)
+        fields = opened.execute_script("const d = document.getElementById('plot-map').data[0]; return [d.y, d.z]")
+        assert None not in fields[1][fields[0].index("task-priority")]
+
+
 def test_failures_are_named_with_reasons(opened: Chrome) -> None:
     text = opened.find_element("id", "failed-table").text
     assert re.search(r"Crashing.* failed .*(SIGSEGV|signal|crash)", text), text
@@ -229,7 +249,7 @@ def test_the_scorecard_has_the_ten_requirements(opened: Chrome) -> None:
     visible = opened.execute_script(
         "return Array.from(document.querySelectorAll('#score-table tbody tr')).filter(r => !r.hidden).length"
     )
-    assert visible == 2, "one row per formulation of the solver chosen"
+    assert visible == 4, "one row per formulation of the solver chosen, and one per baseline"
     assert opened.find_elements("css selector", "#score-table td.pass")
 
 
