@@ -24,8 +24,8 @@ INSERTED: Final = 0.06
 START_DEG: Final = (20.0, -80.0, 100.0, -100.0, -80.0, 20.0)
 # Joint windows of such a cell, as set up in the arm's safety configuration [deg]: elbow up, wrist 2 off its singularity
 # at zero, and for wrist 3 what the drill's cable allows.
-LOWEST_DEG: Final = (-60.0, -150.0, 40.0, -160.0, -130.0, -30.0)
-HIGHEST_DEG: Final = (60.0, -30.0, 130.0, -60.0, -55.0, 30.0)
+LOWEST_DEG: Final = (-60.0, -150.0, 40.0, -170.0, -150.0, -30.0)
+HIGHEST_DEG: Final = (60.0, -30.0, 155.0, -60.0, -40.0, 30.0)
 
 # A hand-held surgical drill's motor, and its bit. Sizes are this project's; the bit counts, so that it is kept off too.
 DRILL: Final = (
