@@ -151,7 +151,7 @@ NOVICE: Final = Character(
 CHARACTERS: Final[dict[str, Character]] = {"expert": EXPERT, "novice": NOVICE}
 
 
-class Hand:
+class SpringHand:
     r"""The mechanics of a hand on the tool.
 
     .. math:: F = K (x_h - x) + D (\dot x_h - \dot x) + F_{tremor}, \qquad |F| \le F_{max}
@@ -202,7 +202,8 @@ class Hand:
 def limited(vector: Array, ceiling: float) -> Array:
     """Return the vector, shortened to `ceiling` if it is longer."""
     size = float(np.sqrt(vector @ vector))
-    return vector if size <= ceiling else vector * (ceiling / size)
+    shortened: Array = vector if size <= ceiling else vector * (ceiling / size)
+    return shortened
 
 
 def rotation_vector(rotation: ArrayLike) -> Array:

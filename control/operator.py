@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .hand import EXPERT, Hand, rotation_vector
+from .hand import EXPERT, SpringHand, rotation_vector
 from .reference import WaitingReference
 from .steering import Doing, Steering
 
@@ -20,41 +20,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-class Operator(Protocol):
-    """Who has a hand on the tool."""
-
-    def wrench(self, t: float, pose: Array, twist: Array) -> Array:
-        """Give what the hand does at time `t` [s].
-
-        Parameters
-        ----------
-        t : float
-            Time; from call to call it does not go back [s].
-        pose : ndarray, shape (4, 4)
-            Of the tool [m].
-        twist : ndarray, shape (6,)
-            Of the tool, world axes [m/s, rad/s].
-
-        Returns
-        -------
-        ndarray, shape (6,)
-            Force [N] and torque [Nm] on the tool at its centre point, world axes.
-        """
-
-    def finished(self, t: float) -> bool:
-        """Whether there is nothing left to do at time `t` [s]."""
-
-    def reset(self) -> None:
-        """Begin from the start, with the same seed."""
-
-
-class PathOperator:
+class Operator:
     """A person who guides the tool along a path.
 
-    The hand is a spring and damper with a ceiling (`Hand`) between the tool and where it aims. The aim is the reference
-    on the path, which waits for the tool (`WaitingReference`), plus an offset by which the person steers (`Steering`).
-    Perceptions reach the person's will one reaction time late; the hand's mechanics act at once. The orientation found
-    at the beginning is held by a rotational spring and damper.
+    The hand is a spring and damper with a ceiling (`SpringHand`) between the tool and where it aims. The aim is the
+    reference on the path, which waits for the tool (`WaitingReference`), plus an offset by which the person steers
+    (`Steering`). Perceptions reach the person's will one reaction time late; the hand's mechanics act at once. The
+    orientation found at the beginning is held by a rotational spring and damper.
 
     The same seed gives the same behaviour, tremor included. Model, equations, parameters: docs/operator.md.
 
@@ -100,7 +72,7 @@ class PathOperator:
         self._stance: Final = towards
         self._tolerance: Final = tolerance
         self._end: Final = path.point(path.length)
-        self._hand: Final = Hand(character, (*self._seed, 0) if tremor else None)
+        self._hand: Final = SpringHand(character, (*self._seed, 0) if tremor else None)
         self._reference: Final = WaitingReference(path, character.speed, character.lead)
         self.reset()
 
@@ -136,7 +108,7 @@ class PathOperator:
         return self._aim.copy()
 
     def wrench(self, t: float, pose: Array, twist: Array) -> Array:
-        """Give what the hand does at time `t` [s]; see `Operator`.
+        """Give what the hand does at time `t` [s]; as `simulate_guiding` asks for it.
 
         Raises
         ------
