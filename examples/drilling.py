@@ -1,4 +1,4 @@
-"""Drilling by hand, with a UR5e: everything that the shared-control drilling robot asks for, at once, for a minute each.
+"""Drilling by hand, with a UR5e: all that the shared-control drilling robot asks for at once, for a minute each.
 
 A surgeon leads the drill to the entry with its orientation fixed, turns it about the entry (a remote centre of motion
 in the world), and drills along a line. He pulls hard, trembles, and pushes where he must not: the modes are held by
@@ -16,7 +16,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import coal
 import numpy as np
@@ -24,7 +24,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from kinqp.benchmarks.scenarios.drilling import INSERTED, START_DEG, drill_self_collision, drilling_robot
-from kinqp.codegen import compile_step
+from kinqp.codegen import CompiledStep, compile_step
 from kinqp.control import GuidedRun, GuidingController, GuidingPhase, GuidingSettings, simulate_guiding
 from kinqp.control.tremor import Tremor
 from kinqp.formulations import Mode, with_constraints
@@ -38,9 +38,11 @@ LEAD, TURN, DRILL = Mode.fix_orientation(), Mode.free("tool"), Mode.line("z")
 MARGIN = 0.05  # between capsules: the surgeon has fingers [m]
 # With which a gap stops closing. More than qdd_max times the lever arms would ask joints for more than qdd_max [m/s^2].
 DECELERATION = 0.5
-# Of the admittance, in the tool's or the world's axes [kg, kg m^2], [N s/m, N m s/rad]. Drilling is seven times heavier.
+# Of the admittance [kg, kg m^2], [N s/m, N m s/rad]; drilling is seven times heavier.
 MASS, DAMPING = np.array([4.0] * 3 + [0.08] * 3), np.array([60.0] * 3 + [1.2] * 3)
 HEAVIER = 7.0
+# What an error costs: the power that the hand loses by it, so that metres and radians are compared as the hand does.
+WEIGHT = DAMPING / DAMPING[0]
 # The thesis's requirement 1 (2.1), and by how much linear rows may miss the margin (docs/constraints.md).
 MOST_MM, MOST_DEG, MISSED_MM = 0.5, 0.25, 0.1
 
@@ -111,22 +113,27 @@ def limited(vector: Array, ceiling: float) -> Array:
     return vector * min(1.0, ceiling / max(float(np.linalg.norm(vector)), 1e-12))
 
 
-def make_controller(formulation: str, *, correct: bool = True, approach: str = "viable") -> GuidingController:
-    """Make the drilling controller: three modes, all with self-collision, turning with the remote centre."""
+def make_steps(formulation: str, approach: str = "viable") -> list[CompiledStep]:
+    """Make a tick in C for each mode: all of them with self-collision, turning with the remote centre too."""
     apart = drill_self_collision(approach=approach)
-    steps = [
+    centre = RemoteCentre(pivot=(0.0, 0.0, 0.0))  # set when it is known
+    return [
         compile_step(ROBOT, with_constraints(formulation, [apart]), LEAD),
-        compile_step(ROBOT, with_constraints(formulation, [RemoteCentre(pivot=(0.0, 0.0, 0.0)), apart]), TURN),
+        compile_step(ROBOT, with_constraints(formulation, [centre, apart]), TURN),
         compile_step(ROBOT, with_constraints(formulation, [apart]), DRILL),
     ]
-    controller = GuidingController(
-        steps, GuidingSettings(admittance_mass=MASS, admittance_damping=DAMPING, drift_gain=10.0 if correct else 0.0)
-    )
-    controller.set(self_collision_margin=MARGIN, self_collision_deceleration=DECELERATION)
+
+
+def make_controller(formulation: str, *, correct: bool = True, approach: str = "viable") -> GuidingController:
+    """Make the drilling controller around such ticks, with or without correction of drift."""
+    settings = GuidingSettings(admittance_mass=MASS, admittance_damping=DAMPING, drift_gain=10.0 if correct else 0.0)
+    controller = GuidingController(make_steps(formulation, approach), settings)
+    controller.set(self_collision_margin=MARGIN)
+    if "self_collision_deceleration" in controller.inputs:
+        controller.set(self_collision_deceleration=DECELERATION)
     controller.set(DRILL, admittance_mass=HEAVIER * MASS, admittance_damping=HEAVIER * DAMPING)
     if "task_weight" in controller.inputs:
-        # An error costs the power that the hand loses by it: metres and radians are then compared as the hand does.
-        controller.set(TURN, task_weight=DAMPING / DAMPING[0])
+        controller.set(TURN, task_weight=WEIGHT)
     if not correct:
         controller.set(TURN, remote_centre_gain=0.0)
     return controller
@@ -270,7 +277,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the tremor")
     chosen = parser.parse_args(arguments)
     controller = make_controller(chosen.formulation)
-    met = show(f"{chosen.formulation}, {chosen.seconds:g} s each", measure(drill(controller, chosen.seconds, chosen.seed)))
+    met = show(
+        f"{chosen.formulation}, {chosen.seconds:g} s each", measure(drill(controller, chosen.seconds, chosen.seed))
+    )
     return 0 if met else 1
 
 

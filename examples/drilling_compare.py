@@ -12,9 +12,22 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 
 import numpy as np
-from drilling import DRILL, ROBOT, TURN, Array, drill, make_controller, measure
+from drilling import (
+    DECELERATION,
+    DRILL,
+    MARGIN,
+    ROBOT,
+    TURN,
+    WEIGHT,
+    Array,
+    drill,
+    make_controller,
+    make_steps,
+    measure,
+)
 
 from kinqp.benchmarks.scenarios.drilling import INSERTED, START_DEG
 from kinqp.formulations import Mode
@@ -47,6 +60,29 @@ def compare(seconds: float) -> None:
     for name, controller in controllers.items():
         rows = {row.what: row.value for row in measure(drill(controller, seconds))}
         print(f"{name:26}" + "".join(f"{rows[what]:>24.4g}" for what in COLUMNS.values()))
+
+
+def tick_times() -> None:
+    """Print how long a tick in C takes, over the states of a run: the best of seven rounds of all its states."""
+    print("\nA tick in C, from state and velocity to command [us]:")
+    for formulation in ("joint-space-robust", "joint-space", "damped"):
+        drilled = drill(make_controller(formulation), 10.0)
+        run, times = drilled.run, []
+        for step, name in zip(make_steps(formulation), ("leading", "turning", "drilling"), strict=True):
+            ticks = drilled.ticks(step.mode)[1:]
+            given: dict[str, object] = {"self_collision_margin": MARGIN, "self_collision_deceleration": DECELERATION}
+            if "remote_centre_pivot" in step.inputs:
+                given["remote_centre_pivot"] = drilled.entry
+                given |= {"task_weight": WEIGHT} if "task_weight" in step.inputs else {}
+            if "qd_prev" in step.inputs:
+                given["qd_prev"] = run.qd[ticks - 1]
+            best = np.inf
+            for _ in range(7):
+                start = time.perf_counter()
+                step.batch(run.q[ticks], run.v[ticks][:, list(step.mode.free_rows)], **given)
+                best = min(best, time.perf_counter() - start)
+            times.append(f"{name} {1e6 * best / len(ticks):5.2f}")
+        print(f"  {formulation:20}" + "   ".join(times))
 
 
 def slip(mode: Mode) -> bool:
@@ -84,7 +120,7 @@ def slip(mode: Mode) -> bool:
         print(f"  joints {label:20} 1.5 s later {1e3 * way[-1]:7.4f} mm off; given up wholly at {yielded} ticks")
     growth = float(np.max(np.diff(way)))
     print(f"  all ticks solved: {solved}; never further off by more than {1e9 * growth:.2g} nm in a tick")
-    return solved and growth < 1e-8 and way[-1] < 2e-5
+    return solved and growth < 1e-7 and way[-1] < 2e-5
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -92,6 +128,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Drilling with other controllers, and after a slip.")
     parser.add_argument("--seconds", type=float, default=60.0, help="of turning, and of drilling")
     compare(parser.parse_args(arguments).seconds)
+    tick_times()
     return 0 if all([slip(DRILL), slip(TURN)]) else 1
 
 

@@ -1,4 +1,4 @@
-"""An LBR Med guided by hand: two modes, a switch between them while the hand pulls, a velocity limit lowered on the way.
+"""An LBR Med guided by hand: two modes, a switch while the hand pulls, a velocity limit lowered on the way.
 
     python examples/hand_guiding.py
 
