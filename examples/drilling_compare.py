@@ -33,33 +33,33 @@ from kinqp.benchmarks.scenarios.drilling import INSERTED, START_DEG
 from kinqp.formulations import Mode
 from kinqp.solvers import Status
 
-COLUMNS = {
-    "shaft off entry [mm]": "turning: shaft off the entry",
-    "tip off line [mm]": "drilling: tip off the line",
-    "turned [deg]": "drilling: tool turned by",
-    "too close [mm]": "capsules closer than the margin by",
-    "acceleration [rad/s^2]": "joint acceleration",
-    "not solved": "ticks not solved",
-    "drawn out to [mm]": "turning: tip from the entry, most",
-    "hand's power [W]": "least power of the hand on the tool",
-}
+ROWS = (
+    "turning: shaft off the entry",
+    "drilling: tip off the line",
+    "drilling: tool turned by",
+    "capsules closer than the margin by",
+    "joint acceleration",
+    "ticks not solved",
+    "turning: tip from the entry, most",
+    "least power of the hand on the tool",
+)
 SLOW = 0.002  # all joints [rad/s]
 SLIP = 2e-3  # sideways [m]
 
 
 def compare(seconds: float) -> None:
-    """Print one line for each controller."""
+    """Print a column for each controller."""
     controllers = {
-        "joint-space-robust": make_controller("joint-space-robust"),
-        "  without correction": make_controller("joint-space-robust", correct=False),
+        "as it is": make_controller("joint-space-robust"),
+        "no correction": make_controller("joint-space-robust", correct=False),
         "joint-space": make_controller("joint-space"),
         "damped": make_controller("damped"),
-        "  and bounds of one step": make_controller("damped", approach="step"),
+        "damped, step": make_controller("damped", approach="step"),
     }
-    print(f"{seconds:g} s each\n{'':26}" + "".join(f"{name:>24}" for name in COLUMNS))
-    for name, controller in controllers.items():
-        rows = {row.what: row.value for row in measure(drill(controller, seconds))}
-        print(f"{name:26}" + "".join(f"{rows[what]:>24.4g}" for what in COLUMNS.values()))
+    tables = [{row.what: row for row in measure(drill(controller, seconds))} for controller in controllers.values()]
+    print(f"{f'{seconds:g} s each':46}" + "".join(f"{name:>15}" for name in controllers))
+    for what in ROWS:
+        print(f"{what:37} {tables[0][what].unit:8}" + "".join(f"{table[what].value:>15.3g}" for table in tables))
 
 
 def tick_times() -> None:
