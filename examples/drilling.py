@@ -223,6 +223,7 @@ def measure(drilled: Drilled) -> list[Row]:
     tool, tip = run.rotation, run.position
     off_entry = np.einsum("kij,ki->kj", tool[turn][:, :, :2], drilled.entry - tip[turn])
     off_line = (tip[along] - tip[along[0]]) @ tool[along[0]][:, :2]
+    hole = (tip[along] - tip[along[0]]) @ tool[along[0]][:, 2]
     depth = np.einsum("ki,ki->k", tool[turn][:, :, 2], tip[turn] - drilled.entry)
     states = np.vstack([run.q, run.q_end])
     beyond = np.maximum(ROBOT.q_min - states, states - ROBOT.q_max).max()
@@ -242,6 +243,7 @@ def measure(drilled: Drilled) -> list[Row]:
         Row("ticks at which a correction gave way", int(run.yielded.sum()), ""),
         Row("turning: tip from the entry, least", 1e3 * depth.min(), "mm"),
         Row("turning: tip from the entry, most", 1e3 * depth.max(), "mm"),
+        Row("drilling: way of the tip along the line", 1e3 * np.ptp(hole), "mm"),
         Row("least power of the hand on the tool", rows[guided].sum(axis=1).min(), "W"),
         Row("ticks with a joint on its limit", 100 * share(run, "joint limits"), "%"),
         Row("ticks with capsules at their margin", 100 * share(run, "self-collision["), "%"),
@@ -261,11 +263,11 @@ def share(run: GuidedRun, name: str) -> float:
 
 def show(title: str, rows: list[Row]) -> bool:
     """Print a table; tell whether all requirements are met."""
-    print(f"\n{title}\n{'':40}{'at most':>12}{'measured':>14}")
+    print(f"\n{title}\n{'':42}{'at most':>12}{'measured':>14}")
     for row in rows:
         most = "" if row.most is None else f"{row.most:.4g}"
         verdict = "" if row.most is None else "ok" if row.holds else "BROKEN"
-        print(f"{row.what:40}{most:>12}{row.value:>14.4g} {row.unit:8}{verdict:8}{row.note}".rstrip())
+        print(f"{row.what:42}{most:>12}{row.value:>14.4g} {row.unit:8}{verdict:8}{row.note}".rstrip())
     return all(row.holds for row in rows)
 
 

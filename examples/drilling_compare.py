@@ -41,6 +41,7 @@ ROWS = (
     "joint acceleration",
     "ticks not solved",
     "turning: tip from the entry, most",
+    "drilling: way of the tip along the line",
     "least power of the hand on the tool",
 )
 SLOW = 0.002  # all joints [rad/s]
@@ -57,9 +58,9 @@ def compare(seconds: float) -> None:
         "damped, step": make_controller("damped", approach="step"),
     }
     tables = [{row.what: row for row in measure(drill(controller, seconds))} for controller in controllers.values()]
-    print(f"{f'{seconds:g} s each':46}" + "".join(f"{name:>15}" for name in controllers))
+    print(f"{f'{seconds:g} s each':50}" + "".join(f"{name:>15}" for name in controllers))
     for what in ROWS:
-        print(f"{what:37} {tables[0][what].unit:8}" + "".join(f"{table[what].value:>15.3g}" for table in tables))
+        print(f"{what:41} {tables[0][what].unit:8}" + "".join(f"{table[what].value:>15.3g}" for table in tables))
 
 
 def tick_times() -> None:
