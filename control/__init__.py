@@ -7,13 +7,16 @@ from .guided_run import GuidedRun, Hand, simulate_guiding
 from .guiding import GuidingController
 from .guiding_result import GuidingPhase, GuidingResult
 from .guiding_settings import GuidingSettings
+from .hand import CHARACTERS, EXPERT, NOVICE, Character
 from .ik_result import IkResult, IkStatus
 from .inverse_kinematics import InverseKinematics, inverse_kinematics
 from .loop import AnyStep, Command, Guide, Step, Trajectory, simulate
 from .make_guiding import make_guiding
+from .operator import Operator
 from .paths import Path, PathFollower, SemicirclePath
 from .point_path import PointPath, solve_points
 from .posture import relax
+from .push import Push
 from .spiral import SpiralPath
 from .step import InterpretedStep, make_step
 from .time_optimal_path import time_optimal_path
@@ -21,8 +24,12 @@ from .trajectories import CubicStopAndGo, JointTrajectory, time_optimal_stop_and
 
 __all__ = [
     "BOUND_TOLERANCE",
+    "CHARACTERS",
+    "EXPERT",
     "FIXED_TOLERANCE",
+    "NOVICE",
     "AnyStep",
+    "Character",
     "Command",
     "CompiledGuiding",
     "CubicStopAndGo",
@@ -38,9 +45,11 @@ __all__ = [
     "InterpretedStep",
     "InverseKinematics",
     "JointTrajectory",
+    "Operator",
     "Path",
     "PathFollower",
     "PointPath",
+    "Push",
     "SemicirclePath",
     "SpiralPath",
     "Step",

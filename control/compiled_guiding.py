@@ -165,7 +165,7 @@ class CompiledGuiding:
         self._reason = ""
 
     def set(self, **inputs: ArrayLike) -> None:
-        """As `GuidingController.set`."""
+        """As `GuidingController.set`, in all modes at once."""
         values: list[tuple[Array, Array]] = []
         for name, value in inputs.items():
             if name not in self._specs:

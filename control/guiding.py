@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Input
     from .loop import AnyStep, Command
 
     Array = NDArray[np.float64]
@@ -47,6 +46,11 @@ class GuidingController:
     dt : float
         Control period [s].
 
+    Attributes
+    ----------
+    inputs : tuple of str
+        Names of what `set` takes, in one mode or another.
+
     Raises
     ------
     ValueError
@@ -61,9 +65,8 @@ class GuidingController:
         self.settings: Final = settings or GuidingSettings()
         self.dt: Final = checked_period(dt)
         self._units: Final = {str(step.mode): GuidingUnit(step, self.settings, self.dt) for step in steps}
-        self._specs: Final[dict[str, Input]] = {}
-        for unit in self._units.values():
-            self._specs.update({given.name: given for given in unit.settable})
+        names = (spec.name for unit in self._units.values() for spec in unit.settable)
+        self.inputs: Final = tuple(dict.fromkeys(names))
         self._target: Array = np.array(self.robot.qd_max)
         self.reset()
 
@@ -87,11 +90,6 @@ class GuidingController:
         """Why it stopped; empty unless it did."""
         return self._reason
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of what `set` takes."""
-        return tuple(self._specs)
-
     def reset(self) -> None:
         """Begin again: at rest, with the first mode, anchored where the arm will be at the next tick."""
         self._phase = GuidingPhase.GUIDING
@@ -113,12 +111,15 @@ class GuidingController:
         ValueError
             When it is none of `modes`.
         """
+        self._wanted = self._units[self._named(mode)]
+        if self._phase is GuidingPhase.GUIDING:
+            self._phase = GuidingPhase.STOPPING
+
+    def _named(self, mode: str | Mode) -> str:
         name = str(checked_modes([mode])[0])
         if name not in self._units:
             raise ValueError(f"mode: expected one of {', '.join(self._units)}, got {name!r}")
-        self._wanted = self._units[name]
-        if self._phase is GuidingPhase.GUIDING:
-            self._phase = GuidingPhase.STOPPING
+        return name
 
     def stop(self, reason: str = "asked to") -> None:
         """Bring the arm to rest, and stay there until `resume`."""
@@ -136,27 +137,47 @@ class GuidingController:
             self._wanted = self._wanted or self._unit
             self._phase = GuidingPhase.STOPPING
 
-    def set(self, **inputs: ArrayLike) -> None:
+    def set(self, mode: str | Mode | None = None, /, **inputs: ArrayLike) -> None:
         """Change limits, weights, settings, by name (`inputs`), from the next tick on.
+
+        Parameters
+        ----------
+        mode : str or Mode, optional
+            Where they change: in this one of `modes` only; in all that have them, unless told otherwise. What has an
+            entry for each guided row, such as `task_weight`, has another shape in each. `qd_max` changes in all.
+        **inputs : array_like
+            As the steps and `GuidingSettings` take them.
 
         Raises
         ------
         InputError
             Naming the input that is unknown, of the wrong shape, not finite or out of range; then nothing is changed.
+        ValueError
+            When the mode is none of `modes`.
         """
-        checked: dict[str, Array] = {}
-        for name, value in inputs.items():
-            if name not in self._specs:
-                raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
-            spec = self._specs[name]
-            checked[name] = np.broadcast_to(check_input(spec, value, self.mode), (spec.size,)).copy()
-        for unit in self._units.values():
-            unit.check(checked)
-        for name, values in checked.items():
-            if name == "qd_max":
-                self._target = values
-            for unit in self._units.values():
-                unit.set(name, values)
+        if mode is not None and "qd_max" in inputs:
+            raise InputError(f"qd_max: expected for all modes at once, got mode {mode}")
+        units = list(self._units.values()) if mode is None else [self._units[self._named(mode)]]
+        known = [{spec.name: spec for spec in unit.settable} for unit in units]
+        for name in inputs:
+            if not any(name in specs for specs in known):
+                names = ", ".join(dict.fromkeys(known_name for specs in known for known_name in specs))
+                raise InputError(f"{name}: expected an input among {names}, got {name!r}")
+        checked: list[dict[str, Array]] = []
+        for unit, specs in zip(units, known, strict=True):
+            given = {name: (specs[name], value) for name, value in inputs.items() if name in specs}
+            checked.append(
+                {
+                    name: np.broadcast_to(check_input(spec, value, unit.mode), (spec.size,)).copy()
+                    for name, (spec, value) in given.items()
+                }
+            )
+            unit.check(checked[-1])
+        for unit, values in zip(units, checked, strict=True):
+            for name, value in values.items():
+                unit.set(name, value)
+                if name == "qd_max":
+                    self._target = value
 
     def __call__(self, q: ArrayLike, wrench: ArrayLike) -> GuidingResult:
         """Compute the command of one control cycle.

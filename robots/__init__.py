@@ -12,6 +12,7 @@ from .limits import DEFAULT_PRISMATIC_QDD_MAX, DEFAULT_REVOLUTE_QDD_MAX
 from .registry import RobotBuilder, available_robots, load_robot
 from .robot import Robot
 from .symbolic import SymbolicKinematics
+from .tool import with_tool
 from .urdf import robot_from_urdf
 from .workspace import Workspace, sample_workspace, tool_positions
 
@@ -35,4 +36,5 @@ __all__ = [
     "robot_from_urdf",
     "sample_workspace",
     "tool_positions",
+    "with_tool",
 ]

@@ -96,7 +96,8 @@ _LBR_MED7: Final = (*_LBR, Capsule("hand", 6, (0.0, 0.0, 0.0607), (0.0, 0.096, 0
 # Axes from the manufacturer's DH table and the offsets of upper arm and forearm along their joint axes, 0.138 and
 # 0.007 m (Universal_Robots_ROS2_Description, config/ur5e/physical_parameters.yaml, BSD-3-Clause). Radii are rounded
 # up from what holds the collision meshes of the UR5, the arm's predecessor of the same build, in the
-# example-robot-data wheel: 0.1105, 0.0916, 0.0879, 0.0801, 0.0651, 0.0655, 0.0435 m.
+# example-robot-data wheel: 0.1105, 0.0916, 0.0879, 0.0801, 0.0651, 0.0655, 0.0435 m. The UR5e's wrist 3 is 17 mm longer
+# (d6 = 0.0996 m instead of 0.0823 m, for its force sensor), and so is the capsule around it.
 _UR5E: Final = (
     Capsule("base", 0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.115),
     Capsule("shoulder", 1, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.095),
@@ -104,7 +105,7 @@ _UR5E: Final = (
     Capsule("forearm", 3, (0.0, 0.0, 0.007), (-0.3922, 0.0, 0.007), 0.082),
     Capsule("wrist 1", 4, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.068),
     Capsule("wrist 2", 5, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.068),
-    Capsule("wrist 3", 6, (0.0, 0.0, -0.0346), (0.0, 0.0, -0.0346), 0.045),
+    Capsule("wrist 3", 6, (0.0, 0.0, -0.0346), (0.0, 0.0, -0.0173), 0.045),
 )
 
 # Which pairs: of 4,000 random states within the limits, those whose capsules came closer than 0.1 m, or less than that

@@ -6,6 +6,7 @@ from typing import Final
 
 from ...solvers.plugins import Registry
 from .base import Scenario
+from .drilling import drilling
 from .limits import infeasible, limit_corner, start_outside_limits
 from .random_states import random_states
 from .semicircle import semicircle
@@ -24,6 +25,7 @@ _REGISTRY: Final = Registry(
         "workspace-boundary": workspace_boundary,
         "drill-line": drill_line,
         "rcm-pivot": rcm_pivot,
+        "drilling": drilling,
         "limit-corner": limit_corner,
         "mode-switch": mode_switch,
         "random-states": random_states,

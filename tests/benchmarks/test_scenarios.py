@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from kinqp.benchmarks import available_scenarios, get_scenario
+from kinqp.benchmarks.scenarios.drilling import INSERTED, START_DEG, drill_self_collision, drilling_robot
 from kinqp.benchmarks.scenarios.limits import CORRECTION, SLOWEST
 from kinqp.benchmarks.scenarios.random_states import NEAR
 from kinqp.benchmarks.scenarios.strokes import RAMP, Stroke, Strokes, pull, rest, strokes
@@ -17,12 +19,13 @@ from kinqp.benchmarks.scenarios.tool_modes import CAREFUL, PIVOT
 from kinqp.codegen import compile_step
 from kinqp.control import make_step
 from kinqp.formulations import available_formulations, viable_bound
+from kinqp.robots import capsule_model
 from kinqp.solvers import Status
 
 from .closed_loop import run
 
 OURS = (
-    "drill-line", "infeasible", "limit-corner", "mode-switch", "random-states", "rcm-pivot", "semicircle",
+    "drill-line", "drilling", "infeasible", "limit-corner", "mode-switch", "random-states", "rcm-pivot", "semicircle",
     "singular-elbow", "singular-shoulder", "singular-wrist", "start-outside-limits", "workspace-boundary",
 )  # fmt: skip
 GUIDED = tuple(name for name in OURS if name not in ("infeasible", "random-states", "semicircle"))
@@ -146,6 +149,51 @@ def test_pivot_stays_where_it_is_while_the_tool_turns() -> None:
     assert np.max(tilt) > 0.1
     drawn = (poses[-1][:3, 3] - start[:3, 3]) @ start[:3, 2]
     assert drawn < -0.015
+
+
+@pytest.mark.parametrize("formulation", ["cartesian-error", "damped"])
+def test_drilling_is_led_turned_and_pushed(formulation: str) -> None:
+    made = run("drilling", formulation)
+    robot = made.scenario.robot
+    assert robot.tip == "drill_tip"
+    assert [str(mode) for mode in made.scenario.modes] == ["fix-orientation", "rcm:-0.06", "line:z"]
+    turning, pushing = (int(np.argmax(made.phase == k)) for k in (1, 2))
+    # The hand rests where the mode changes, and the arm does too.
+    for k in (turning, pushing):
+        assert np.max(np.abs(made.qd[k - 1 : k + 1])) < 1e-3
+    poses = [robot.pose(q) for q in made.q]
+    led = poses[turning][:3, 3] - poses[0][:3, 3]
+    assert np.linalg.norm(led) == pytest.approx(0.15 * np.linalg.norm([0.15, -0.06, -0.05]), rel=0.05)
+    assert np.max(np.abs(poses[turning][:3, :3] - poses[0][:3, :3])) < 1e-5
+    # Wrist 3 slides onto the limit that its cable sets, is held there, and comes off again.
+    on = np.array(["joint limits[5] upper" in active for active in made.active])
+    assert set(made.phase[on]) == {1}
+    assert 0.1 < np.mean(on) < 0.2
+    assert np.min(made.distance[:, 5]) < 1e-6
+    assert np.min(made.distance) > -1e-12
+    assert not on[pushing - 1]
+    # Until then the shaft turns about the entry.
+    entry = poses[turning][:3, 3] - INSERTED * poses[turning][:3, 2]
+    free = range(turning, int(np.argmax(on)))
+    assert max(np.linalg.norm(np.cross(poses[k][:3, 2], entry - poses[k][:3, 3])) for k in free) < 1e-4
+    tilt = np.arccos(poses[pushing][:3, 2] @ poses[turning][:3, 2])
+    assert np.rad2deg(tilt) > 3.0
+    start = poses[pushing]
+    ways = np.array([start[:3, :3].T @ (pose[:3, 3] - start[:3, 3]) for pose in poses[pushing:]])
+    assert np.max(np.abs(ways[:, :2])) < 5e-6
+    assert ways[-1, 2] == pytest.approx(0.015, rel=0.05)
+
+
+def test_drill_is_kept_off_the_arm() -> None:
+    """Capsules of the UR5e and of the drill, which ends at the tool centre point."""
+    robot = drilling_robot()
+    pairs = drill_self_collision().checked_pairs(robot)
+    assert len(pairs) == len(capsule_model("ur5e").pairs) + 8
+    (bit,) = {capsule for pair in pairs for capsule in pair if capsule.name == "bit"}
+    q = np.deg2rad(START_DEG)
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, q)
+    assert data.oMi[bit.link].act(np.array(bit.end)) == pytest.approx(robot.pose(q)[:3, 3], abs=1e-12)
 
 
 def test_modes_are_switched_while_the_hand_pulls() -> None:

@@ -273,6 +273,28 @@ class TestLimits:
         assert np.linalg.norm(run.twist[-1, :3]) > 0.15
         assert set(run.phase) == {GuidingPhase.GUIDING}
 
+    def test_a_mode_has_settings_of_its_own(self):
+        controller = guiding(["fix-orientation", "line:z"])
+        slow = np.full(6, 600.0)
+        controller.set("line:z", admittance_damping=slow, task_weight=2.0)
+        pull = [5.0, 0, 0, 0, 0, 0]
+        along = ROBOT.pose(START)[0, 2] * 5.0
+        first = controller(START, pull).v[0]
+        assert first == pytest.approx(4.0 / 60.0 * (1.0 - np.exp(-60.0 / 4.0 * DT)))
+        controller = guiding(["line:z", "fix-orientation"], settings=GuidingSettings(force_dead_zone=0.0))
+        controller.set(Mode.line("z"), admittance_damping=slow)
+        assert controller(START, pull).v[0] == pytest.approx(along / 600.0 * (1.0 - np.exp(-600.0 / 4.0 * DT)))
+
+    def test_rows_have_another_weight_in_each_mode(self):
+        controller = guiding(["free", "fix-orientation"])
+        controller.set("free", task_weight=[1.0, 1.0, 1.0, 0.02, 0.02, 0.02])
+        with pytest.raises(InputError, match=r"task_weight: expected shape \(3,\)"):
+            controller.set("fix-orientation", task_weight=[1.0, 1.0, 1.0, 0.02, 0.02, 0.02])
+        with pytest.raises(InputError, match="qd_max: expected for all modes at once, got mode free"):
+            controller.set("free", qd_max=0.1)
+        with pytest.raises(ValueError, match="mode: expected one of free, fix-orientation, got 'position'"):
+            controller.set("position", force_dead_zone=0.0)
+
     def test_joint_limit_is_slid_along(self):
         limits = ROBOT.q_max.copy()
         limits[3] = START[3] + 0.02
@@ -392,6 +414,7 @@ class TestBadInput:
             ({"qd_max": -1.0}, "qd_max: expected numbers above 0"),
             ({"admittance_mass": [1.0, 2.0]}, r"admittance_mass: expected shape \(6,\)"),
             ({"q_min": 9.0}, "q_min and q_max: expected q_min <= q_max"),
+            ({"task_weight": [1.0, 2.0]}, r"task_weight: expected shape \(3,\)"),
         ],
     )
     def test_set_changes_nothing(self, inputs, message):

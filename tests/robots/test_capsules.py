@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from kinqp.robots import Capsule, RobotError, capsule_model, load_robot
+
+from .arms import example_urdf
 
 NAMES = ("lbr_med14", "lbr_med7", "ur5e")
 
@@ -53,6 +56,37 @@ def test_ur5e_hands_hang_where_the_dh_table_puts_them() -> None:
     np.testing.assert_allclose(centre["wrist 1"], [-0.8172, -0.1333, 0.1625], atol=1e-12)
     np.testing.assert_allclose(centre["wrist 2"], [-0.8172, -0.1333, 0.1625 - 0.0997], atol=1e-12)
     np.testing.assert_allclose(centre["wrist 3"], [-0.8172, -0.1333 - 0.065, 0.1625 - 0.0997], atol=1e-12)
+
+
+# Where the capsules of the UR5e lie on the UR5, in the frames of its own URDF: its lengths, its axes. The last one
+# twice, since the UR5e's wrist 3 is longer by the difference of the two arms' d6.
+LONGER = 0.0996 - 0.0823
+ON_UR5 = (
+    ("base", "base", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ("shoulder", "shoulder", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+    ("upper arm", "upperarm", (0.0, 0.0, 0.0), (0.0, 0.0, 0.425)),
+    ("forearm", "forearm", (0.0, 0.0, 0.0), (0.0, 0.0, 0.39225)),
+    ("wrist 1", "wrist1", (0.0, 0.093, 0.0), (0.0, 0.093, 0.0)),
+    ("wrist 2", "wrist2", (0.0, 0.0, 0.09465), (0.0, 0.0, 0.09465)),
+    ("wrist 3", "wrist3", (0.0, 0.065, 0.0), (0.0, 0.065 + LONGER, 0.0)),
+    ("wrist 3", "wrist3", (0.0, 0.065 - LONGER, 0.0), (0.0, 0.065, 0.0)),
+)
+
+
+@pytest.mark.parametrize(("capsule", "mesh", "start", "end"), ON_UR5)
+def test_ur5e_capsules_hold_the_meshes_of_its_predecessor(
+    capsule: str, mesh: str, start: tuple[float, ...], end: tuple[float, ...]
+) -> None:
+    (own,) = (c for c in capsule_model("ur5e").capsules if c.name == capsule)
+    path = example_urdf("ur5").parents[1] / "meshes/ur5/collision" / f"{mesh}.stl"
+    vertices = np.array(coal.MeshLoader().load(str(path), np.ones(3)).vertices())
+    assert len(vertices) > 50
+    along = np.subtract(end, start)
+    share = np.clip((vertices - start) @ along / max(along @ along, 1e-12), 0.0, 1.0)
+    away = np.linalg.norm(vertices - start - share[:, None] * along, axis=1)
+    assert np.max(away) <= own.radius
+    # Nor is there much air in it.
+    assert np.max(away) > own.radius - 0.006
 
 
 @pytest.mark.parametrize(
