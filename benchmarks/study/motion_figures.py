@@ -1,0 +1,176 @@
+"""What the joints did in the representative trial: all of them, and the elbow (thesis, sections 5.3.1 to 5.3.4)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import casadi as ca
+import numpy as np
+
+from ...formulations.bounds import velocity_bounds
+from ..report.palette import COLOURS
+from .panels import ALGORITHM_COLOURS, LIMIT_COLOUR, Band, Line, Panel, PanelFigure, thinned
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from .panels import Content
+    from .provisional import GuidedRun
+    from .result import StudyResult, StudySettings
+
+    Array = NDArray[np.float64]
+
+_DEG: Final = 180.0 / np.pi
+# Stretches of a run of which the smallest and largest value are drawn.
+_BUCKETS: Final = 450
+# Smallest acceleration on the logarithmic axis [rad/s^2]: below is rounding.
+_FLOOR: Final = 1e-6
+_COLUMN: Final = {"A": "A: task priority", "B": "B: saturation in the null space", "C": "C: QP"}
+
+
+def column_title(letter: str, settings: StudySettings) -> str:
+    """Heading of an algorithm's column: the thesis's name for it, or that of what took its place."""
+    usual = {"A": "task-priority", "B": "saturation-null-space", "C": "joint-space"}
+    name = settings.algorithms[letter]
+    return _COLUMN[letter] if usual.get(letter) == name else f"{letter}: {name}"
+
+
+def joint_figure(found: StudyResult, *, buckets: int = _BUCKETS) -> PanelFigure:
+    """Position, velocity, acceleration and torque of all joints, a column for each algorithm."""
+    rows: list[tuple[str, Callable[[str, GuidedRun], Array]]] = [
+        ("position [°]", lambda _, run: _DEG * run.q),
+        ("velocity [rad/s]", lambda _, run: run.qd),
+        ("acceleration [rad/s²]", lambda _, run: run.acceleration()),
+        ("torque [Nm]", lambda letter, _: found.torques[letter]),
+    ]
+    panels = tuple(
+        tuple(
+            Panel(
+                column_title(letter, found.settings) if number == 0 else "",
+                "time [s]",
+                label,
+                tuple(
+                    thinned(f"joint {joint + 1}", run.t, column, COLOURS[joint % len(COLOURS)], buckets=buckets)
+                    for joint, column in enumerate(values(letter, run).T)
+                ),
+            )
+            for letter, run in found.runs.items()
+        )
+        for number, (label, values) in enumerate(rows)
+    )
+    return PanelFigure(
+        "joints",
+        "All joints",
+        "One trial of the same simulated operator with each algorithm. Accelerations are differences of the commands; "
+        "torques follow from them by inverse dynamics, gravity included.",
+        panels,
+        share_y=True,
+        share_x=True,
+        row_height=230,
+    )
+
+
+def elbow_figure(found: StudyResult, *, buckets: int = 2 * _BUCKETS) -> PanelFigure:
+    """The elbow: position with its limits, velocity in its bounds, acceleration with its limit, and that again as a
+    logarithm (thesis, section 5.3.4).
+    """
+    settings, elbow = found.settings, found.settings.elbow
+    columns = [
+        _elbow_column(letter, run, settings, elbow, buckets, title=column_title(letter, settings))
+        for letter, run in found.runs.items()
+    ]
+    return PanelFigure(
+        "elbow",
+        f"The elbow (joint {elbow + 1})",
+        "The same trials. Grey: the velocities from which the joint can still brake in time at its acceleration limit "
+        "(the bounds of C). Below, the size of the acceleration as a logarithm, as the thesis argues with orders "
+        "of magnitude.",
+        tuple(zip(*columns, strict=True)),
+        share_y=True,
+        share_x=True,
+        row_height=230,
+    )
+
+
+def _elbow_column(
+    letter: str, run: GuidedRun, settings: StudySettings, elbow: int, buckets: int, *, title: str
+) -> tuple[Panel, ...]:
+    colour, ends = ALGORITHM_COLOURS[letter], run.t[[0, -1]]
+    q, qd, qdd = run.q[:, elbow], run.qd[:, elbow], run.acceleration()[:, elbow]
+    low, high = _DEG * settings.q_min[elbow], _DEG * settings.q_max[elbow]
+    most = settings.qdd_max[elbow]
+    nearest = low if np.min(q) * _DEG - low < high - np.max(q) * _DEG else high
+
+    def curve(values: Array) -> Line:
+        return thinned(letter, run.t, values, colour, buckets=buckets, width=1.6)
+
+    def limit(*values: float) -> list[Content]:
+        return [
+            Line("limit" if number == 0 else "", ends, np.full(2, value), LIMIT_COLOUR, "dash", 1.1)
+            for number, value in enumerate(values)
+        ]
+
+    every = max(1, len(run.t) // (2 * buckets))
+    lower, upper = elbow_bounds(q[::every], settings)
+    shown = 1.25 * max(float(np.max(np.abs(qd))), 0.05)
+    band = Band(
+        "admissible velocities", run.t[::every], np.maximum(lower, -shown), np.minimum(upper, shown)
+    )
+    size = np.maximum(np.abs(qdd), _FLOOR)
+    return (
+        Panel(title, "time [s]", "position [°]", (curve(_DEG * q), *limit(nearest))),
+        Panel("", "time [s]", "velocity [rad/s]", (band, curve(qd))),
+        Panel("", "time [s]", "acceleration [rad/s²]", (curve(qdd), *limit(-most, most))),
+        Panel("", "time [s]", "|acceleration| [rad/s²]", (curve(size), *limit(most)), log_y=True),
+    )
+
+
+def elbow_phase_figure(found: StudyResult, *, buckets: int = 2 * _BUCKETS) -> PanelFigure:
+    """Velocity over position of the elbow near its limit, in the area of admissible velocities (thesis, figure 4.1)."""
+    settings, elbow = found.settings, found.settings.elbow
+    every = np.concatenate([run.q[:, elbow] for run in found.runs.values()])
+    low, high = settings.q_min[elbow], settings.q_max[elbow]
+    at_low = every.min() - low < high - every.max()
+    # Dense towards the limit, where the braking curve is steep.
+    share = np.linspace(0.0, 1.0, 240) ** 2
+    grid = low + share * (every.max() - low) if at_low else high - share * (high - every.min())
+    lower, upper = elbow_bounds(grid, settings)
+    panels = []
+    for letter, run in found.runs.items():
+        q, qd = run.q[:, elbow], run.qd[:, elbow]
+        chosen = np.union1d(
+            np.linspace(0, len(q) - 1, buckets).astype(int), np.argsort(-np.abs(run.acceleration()[:, elbow]))[:50]
+        )
+        panels.append(
+            Panel(
+                column_title(letter, settings),
+                "position [°]",
+                "velocity [rad/s]",
+                (
+                    Band("admissible velocities", _DEG * grid, lower, upper),
+                    Line(letter, _DEG * q[chosen], qd[chosen], ALGORITHM_COLOURS[letter], width=1.6),
+                ),
+            )
+        )
+    most = 1.25 * max(float(np.abs(run.qd[:, elbow]).max()) for run in found.runs.values())
+    shown = tuple(Panel(p.title, p.x_label, p.y_label, p.contents, y_range=(-most, most)) for p in panels)
+    return PanelFigure(
+        "elbow-phase",
+        "The elbow's velocity over its position",
+        "A curve that leaves the grey area towards the limit can no longer stop in time at the acceleration limit: it "
+        "falls to zero at once, which is the hard stop.",
+        (shown,),
+        share_y=True,
+        row_height=330,
+    )
+
+
+def elbow_bounds(q: Array, settings: StudySettings) -> tuple[Array, Array]:
+    """Smallest and largest admissible velocity of the elbow at positions of shape (N,) [rad]: (N,) each [rad/s]."""
+    at, elbow = ca.SX.sym("q"), settings.elbow
+    limits = (settings.q_min[elbow], settings.q_max[elbow], settings.qd_max[elbow], settings.qdd_max[elbow])
+    both = velocity_bounds("viable", at, *(ca.SX(value) for value in limits), ca.SX(settings.dt))
+    lower, upper = ca.Function("bounds", [at], list(both))(np.asarray(q)[None, :])
+    return np.array(lower).ravel(), np.array(upper).ravel()
