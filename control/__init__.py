@@ -1,12 +1,20 @@
 """Control: one cycle from any formulation and solver, paths, the closed loop, inverse kinematics, trajectories."""
 
 from ..formulations import BOUND_TOLERANCE, FIXED_TOLERANCE
+from .guided_run import GuidedRun, Hand, simulate_guiding
+from .guiding import GuidingController
+from .guiding_result import GuidingPhase, GuidingResult
+from .guiding_settings import GuidingSettings
+from .hand import CHARACTERS, EXPERT, NOVICE, Character
 from .ik_result import IkResult, IkStatus
 from .inverse_kinematics import InverseKinematics, inverse_kinematics
-from .loop import Guide, Step, Trajectory, simulate
+from .loop import AnyStep, Command, Guide, Step, Trajectory, simulate
+from .make_guiding import make_guiding
+from .operator import Operator
 from .paths import Path, PathFollower, SemicirclePath
 from .point_path import PointPath, solve_points
 from .posture import relax
+from .push import Push
 from .spiral import SpiralPath
 from .step import InterpretedStep, make_step
 from .time_optimal_path import time_optimal_path
@@ -14,25 +22,41 @@ from .trajectories import CubicStopAndGo, JointTrajectory, time_optimal_stop_and
 
 __all__ = [
     "BOUND_TOLERANCE",
+    "CHARACTERS",
+    "EXPERT",
     "FIXED_TOLERANCE",
+    "NOVICE",
+    "AnyStep",
+    "Character",
+    "Command",
     "CubicStopAndGo",
     "Guide",
+    "GuidedRun",
+    "GuidingController",
+    "GuidingPhase",
+    "GuidingResult",
+    "GuidingSettings",
+    "Hand",
     "IkResult",
     "IkStatus",
     "InterpretedStep",
     "InverseKinematics",
     "JointTrajectory",
+    "Operator",
     "Path",
     "PathFollower",
     "PointPath",
+    "Push",
     "SemicirclePath",
     "SpiralPath",
     "Step",
     "Trajectory",
     "inverse_kinematics",
+    "make_guiding",
     "make_step",
     "relax",
     "simulate",
+    "simulate_guiding",
     "solve_points",
     "time_optimal_path",
     "time_optimal_stop_and_go",

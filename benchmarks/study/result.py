@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .provisional import GuidedRun
+    from ...control import GuidedRun
 
     Array = NDArray[np.float64]
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
+from ...control import GuidedRun, GuidingPhase
+from ...formulations import Mode
 from ...robots import load_robot
 from ...solvers import Status
-from .provisional import GuidedRun
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,8 +32,8 @@ def frame_of(run: GuidedRun, torque: Array) -> pl.DataFrame:
     columns["torque"] = np.ascontiguousarray(torque)
     columns |= {
         "status": [status.value for status in run.status],
-        "mode": list(run.mode),
-        "phase": list(run.phase),
+        "mode": [str(mode) for mode in run.mode],
+        "phase": [phase.value for phase in run.phase],
         "active": pl.Series([list(names) for names in run.active], dtype=pl.List(pl.String)),
         "iterations": run.iterations,
         "yielded": run.yielded,
@@ -42,12 +43,13 @@ def frame_of(run: GuidedRun, torque: Array) -> pl.DataFrame:
 
 def run_of(frame: pl.DataFrame, robot: str, dt: float, q_end: Array) -> GuidedRun:
     """Make the run again of its frame, its robot's name, its control period [s] and its last state [rad]."""
+    modes = {name: Mode.parse(name) for name in frame["mode"].unique()}
     return GuidedRun(
         t=frame["t"].to_numpy(),
         rotation=frame["rotation"].to_numpy().reshape(-1, 3, 3),
         status=tuple(Status(value) for value in frame["status"]),
-        mode=tuple(frame["mode"]),
-        phase=tuple(frame["phase"]),
+        mode=tuple(modes[name] for name in frame["mode"]),
+        phase=tuple(GuidingPhase(value) for value in frame["phase"]),
         active=tuple(tuple(names) for names in frame["active"].to_list()),
         iterations=frame["iterations"].to_numpy(),
         yielded=frame["yielded"].to_numpy(),

@@ -6,8 +6,9 @@ import polars as pl
 import pytest
 
 from kinqp.benchmarks.study import ALGORITHMS, StudyError, StudyResult, StudySettings
-from kinqp.benchmarks.study.provisional import GuidedRun
 from kinqp.benchmarks.study.result import TRIAL_COLUMNS
+from kinqp.control import GuidedRun, GuidingPhase
+from kinqp.formulations import Mode
 from kinqp.robots import load_robot
 from kinqp.solvers import Status
 
@@ -31,8 +32,9 @@ def run(seed: int) -> GuidedRun:
         position=rng.normal(size=(COUNT, 3)), rotation=rng.normal(size=(COUNT, 3, 3)),
         wrench=rng.normal(size=(COUNT, 6)),
         twist=rng.normal(size=(COUNT, 6)), v=rng.normal(size=(COUNT, 6)), v_actual=rng.normal(size=(COUNT, 6)),
-        status=(Status.SOLVED,) * 4 + (Status.INACCURATE,), mode=("fix-orientation",) * COUNT,
-        phase=("guiding",) * COUNT, active=((), ("joint limits[3] lower",), (), ("a", "b"), ()),
+        status=(Status.SOLVED,) * 4 + (Status.INACCURATE,), mode=(Mode.fix_orientation(),) * COUNT,
+        phase=(GuidingPhase.GUIDING,) * 4 + (GuidingPhase.STOPPED,),
+        active=((), ("joint limits[3] lower",), (), ("a", "b"), ()),
         iterations=np.arange(COUNT), drift=rng.normal(size=(COUNT, 2)), yielded=np.arange(COUNT) % 2 == 0, dt=1e-3,
         robot=ROBOT, q_end=rng.normal(size=7),
     )  # fmt: skip
