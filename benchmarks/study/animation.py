@@ -14,7 +14,7 @@ from .skeleton import Skeleton
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .provisional import GuidedRun
+    from ...control import GuidedRun
     from .result import StudyResult
 
     Array = NDArray[np.float64]
@@ -72,7 +72,6 @@ def _frames(
         "peak": [round(float(acceleration[begin:end].max()), 2) for begin, end in spans],
         "limit": [int(on[begin:end].any()) for begin, end in spans],
         "still": [int(still[begin:end].mean() >= 0.5) for begin, end in spans],
-        "phase": [run.phase[tick] for tick in ticks],
     }
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...control import SemicirclePath
+from ...control.steering import PULLING, STILL
 from .outcomes_table import Medians, OutcomeTest, medians, outcome_tests
 from .pattern import Verdict, verdicts
 from .questionnaire_checks import QuestionnaireChecks, check_questionnaire
@@ -80,6 +81,17 @@ class Findings:
                 for one in self.questionnaire.comparisons
             ],
         }  # fmt: skip
+
+
+def _path(study: StudyResult) -> Array:
+    settings = study.settings
+    start = study.runs["A"].robot.pose(settings.q0)[:3, 3]
+    path = SemicirclePath(start, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), settings.radius)
+    return np.array([path.point(s) for s in np.linspace(0.0, path.length, 121)])
+
+
+def standing(run):
+    return (np.linalg.norm(run.twist[:, :3], axis=1) < STILL) & (np.linalg.norm(run.wrench[:, :3], axis=1) > PULLING)
 
 
 def analyse(study: StudyResult, conditions: Mapping[str, str]) -> Findings:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .panels import Content
-    from .provisional import GuidedRun
+    from ...control import GuidedRun
     from .result import StudyResult, StudySettings
 
     Array = NDArray[np.float64]
@@ -127,41 +127,38 @@ def _elbow_column(
     )
 
 
-def elbow_phase_figure(found: StudyResult, *, buckets: int = 2 * _BUCKETS) -> PanelFigure:
-    """Velocity over position of the elbow near its limit, in the area of admissible velocities (thesis, figure 4.1)."""
+def elbow_phase_figure(found: StudyResult) -> PanelFigure:
+    """Velocity over position of the elbow next to its limit, with the area of admissible velocities (figure 4.1)."""
     settings, elbow = found.settings, found.settings.elbow
     every = np.concatenate([run.q[:, elbow] for run in found.runs.values()])
     low, high = settings.q_min[elbow], settings.q_max[elbow]
     at_low = every.min() - low < high - every.max()
+    limit, inwards = (low, 1.0) if at_low else (high, -1.0)
+    # As far from the limit as the fastest of them needs to brake, and as much again.
+    fastest = max(float(np.abs(run.qd[:, elbow]).max()) for run in found.runs.values())
+    reach = max(2.0 * 0.5 * fastest**2 / settings.qdd_max[elbow], np.deg2rad(0.25))
     # Dense towards the limit, where the braking curve is steep.
-    share = np.linspace(0.0, 1.0, 240) ** 2
-    grid = low + share * (every.max() - low) if at_low else high - share * (high - every.min())
+    grid = limit + inwards * reach * np.linspace(0.0, 1.0, 240) ** 2
     lower, upper = elbow_bounds(grid, settings)
+    most = 1.25 * max(fastest, 0.05)
+    band = Band("admissible velocities", _DEG * grid, np.maximum(lower, -most), np.minimum(upper, most))
     panels = []
     for letter, run in found.runs.items():
         q, qd = run.q[:, elbow], run.qd[:, elbow]
-        chosen = np.union1d(
-            np.linspace(0, len(q) - 1, buckets).astype(int), np.argsort(-np.abs(run.acceleration()[:, elbow]))[:50]
-        )
+        near = np.abs(q - limit) <= reach
+        # Whatever is farther away is a gap; the ticks at which nothing changes are not drawn.
+        q, qd = np.where(near, _DEG * q, np.nan), np.where(near, qd, np.nan)
+        changes = np.append(True, (np.abs(np.diff(q)) > 1e-6) | (np.abs(np.diff(qd)) > 1e-6) | np.diff(near))
+        line = Line(letter, q[changes], qd[changes], ALGORITHM_COLOURS[letter], width=1.6)
         panels.append(
-            Panel(
-                column_title(letter, settings),
-                "position [°]",
-                "velocity [rad/s]",
-                (
-                    Band("admissible velocities", _DEG * grid, lower, upper),
-                    Line(letter, _DEG * q[chosen], qd[chosen], ALGORITHM_COLOURS[letter], width=1.6),
-                ),
-            )
+            Panel(column_title(letter, settings), "position [°]", "velocity [rad/s]", (band, line), y_range=(-most, most))
         )
-    most = 1.25 * max(float(np.abs(run.qd[:, elbow]).max()) for run in found.runs.values())
-    shown = tuple(Panel(p.title, p.x_label, p.y_label, p.contents, y_range=(-most, most)) for p in panels)
     return PanelFigure(
         "elbow-phase",
-        "The elbow's velocity over its position",
+        "The elbow's velocity over its position, next to its limit",
         "A curve that leaves the grey area towards the limit can no longer stop in time at the acceleration limit: it "
         "falls to zero at once, which is the hard stop.",
-        (shown,),
+        (tuple(panels),),
         share_y=True,
         row_height=330,
     )

@@ -26,7 +26,7 @@ def outcome_figure(trials: pl.DataFrame) -> PanelFigure:
     """Every outcome of every trial, by algorithm and character."""
     panels = [_boxes(trials, outcome, outcome.name) for outcome in OUTCOMES if _varies(trials, outcome.key)]
     same = [outcome for outcome in OUTCOMES if not _varies(trials, outcome.key)]
-    left_out = "; ".join(f"{one.name} is {trials[one.key][0]:g} {one.unit}".strip() for one in same)
+    left_out = "; ".join(f"{one.name} is {one.scale * trials[one.key][0]:g} {one.unit}".strip() for one in same)
     return PanelFigure(
         "outcomes",
         "Outcomes of all trials",
@@ -100,7 +100,7 @@ def _by_algorithm(trials: pl.DataFrame, outcome: Outcome) -> Panel:
 
 def _shown(outcome: Outcome, values: np.ndarray) -> np.ndarray:
     # A logarithm has no place for zero.
-    return np.maximum(values, 1e-9) if outcome.log else values
+    return outcome.scale * (np.maximum(values, 1e-9) if outcome.log else values)
 
 
 def _varies(trials: pl.DataFrame, key: str) -> bool:

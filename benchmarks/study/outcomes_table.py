@@ -29,12 +29,15 @@ class Outcome:
     name, unit : str
     log : bool
         Whether it is shown as a logarithm.
+    scale : float
+        Of the unit that it is shown in, to that of the column.
     """
 
     key: str
     name: str
     unit: str
     log: bool = False
+    scale: float = 1.0
 
     @property
     def label(self) -> str:
@@ -47,7 +50,7 @@ OUTCOMES: Final = (
     Outcome("time", "time to finish", "s"),
     Outcome("stops", "stops", ""),
     Outcome("standing", "standing still", "s"),
-    Outcome("path_error_rms", "distance from the path, RMS", "m"),
+    Outcome("path_error_rms", "distance from the path, RMS", "mm", scale=1e3),
     Outcome("work_against", "work against the hand", "J"),
     Outcome("elbow_peak_qdd", "elbow acceleration, peak", "rad/s²", log=True),
     Outcome("peak_qdd", "acceleration of any joint, peak", "rad/s²", log=True),

@@ -128,7 +128,7 @@ def _chart(described: PanelFigure) -> dict[str, Any]:
 def _lead(settings: StudySettings) -> str:
     count = " and ".join(f"{count} {name}s" for name, count in settings.counts.items() if count)
     return (
-        f"{settings.operators} simulated operators ({count}), {settings.trials} trials each with every algorithm, in random order, on a "
+        f"{settings.operators} simulated operators ({count}), {settings.trials} trials each with every algorithm, in random order, on the "
         f"{settings.robot}: the experiment of chapter 5 of A. Spinoglio's thesis, again, measured at every tick of "
         f"{1e3 * settings.dt:g} ms."
     )
@@ -138,8 +138,8 @@ def _tiles(found: Findings) -> list[dict[str, str]]:
     by = {one.outcome.key: one.by for one in found.medians}
 
     def tile(letter: str, key: str, label: str, unit: str, kind: str = "") -> dict[str, str]:
-        value = f"{tables.number(by[key][letter, 'all'].value)} {unit}".strip()
-        return {"value": value, "label": f"{label} with {letter}, median", "kind": kind}
+        value = tables.number(by[key][letter, "all"].value)
+        return {"value": value, "label": f"{letter}: {label} [{unit}], median", "kind": kind}
 
     judged = [one.holds for one in found.verdicts if one.holds is not None]
     holding = sum(judged)
@@ -149,8 +149,8 @@ def _tiles(found: Findings) -> list[dict[str, str]]:
             "label": "expectations hold",
             "kind": "good" if holding == len(judged) else "bad",
         },
-        *(tile(letter, "elbow_peak_qdd", "elbow acceleration", "rad/s²") for letter in found.study.runs),
-        *(tile(letter, "time", "time", "s") for letter in found.study.runs),
+        *(tile(letter, "elbow_peak_qdd", "peak elbow acceleration", "rad/s²") for letter in found.study.runs),
+        *(tile(letter, "time", "time to finish", "s") for letter in found.study.runs),
     ]
 
 
@@ -181,7 +181,7 @@ def _characters(settings: StudySettings) -> dict[str, Any]:
     names = list(settings.characters)
     keys = list(dict.fromkeys(key for fields in settings.characters.values() for key in fields))
     rows = [
-        {"name": key.replace("_", " "), "values": [f"{settings.characters[name].get(key, '–')}" for name in names]}
+        {"name": key.replace("_", " "), "cells": [f"{settings.characters[name].get(key, '–')}" for name in names]}
         for key in keys
     ]
     return {"names": names, "rows": rows}

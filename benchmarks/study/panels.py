@@ -148,6 +148,15 @@ class PanelFigure:
         return tuple(panel for row in self.rows for panel in row if panel is not None)
 
 
+def decades(panel: Panel) -> float:
+    """Decades that a panel's lines and boxes span, limits included."""
+    values = [one.y for one in panel.contents if isinstance(one, Line)]
+    values += [some for one in panel.contents if isinstance(one, Boxes) for some in one.values]
+    every = np.concatenate(values) if values else np.ones(1)
+    positive = every[every > 0.0]
+    return float(np.log10(positive.max() / positive.min())) if positive.size else 0.0
+
+
 def thinned(
     name: str,
     x: Array,

@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from matplotlib.ticker import LogLocator, NullLocator
+
 from ..report.paper.style import DASHES, figure
-from .panels import Band, Bars, Boxes, Line
+from .panels import Band, Bars, Boxes, Line, decades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 _ROW: Final = 1.45
 # Of the places side by side in a category, how much bars and boxes fill.
 _FILL: Final = 0.8
+# Decades on a logarithmic axis below which it is marked between them, too.
+_NARROW: Final = 2.5
 
 
 def to_paper(described: PanelFigure) -> Figure:
@@ -80,6 +84,10 @@ def _draw(axis: Axes, panel: Panel) -> None:
         axis.grid(visible=False, axis="x")
     if panel.log_y:
         axis.set_yscale("log")
+        if decades(panel) < _NARROW:
+            axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.yaxis.set_major_formatter("{x:g}")
+            axis.yaxis.set_minor_locator(NullLocator())
     if panel.y_range is not None:
         axis.set_ylim(*panel.y_range)
 
@@ -98,8 +106,10 @@ def _in_groups(axis: Axes, content: Bars | Boxes, places: NDArray[np.float64], w
         boxprops=line, whiskerprops=line, capprops=line, medianprops={**line, "linewidth": 1.6},
     )  # fmt: skip
     rng = np.random.default_rng(0)
-    for number, (place, values) in enumerate(zip(places, content.values, strict=True)):
+    for place, values in zip(places, content.values, strict=True):
         axis.plot(
             place + rng.uniform(-0.22, 0.22, len(values)) * width, values, ".", color=content.colour, markersize=2.0,
-            markeredgewidth=0.0, alpha=0.5, label=content.name if number == 0 else None,
+            markeredgewidth=0.0, alpha=0.5,
         )  # fmt: skip
+    # For the legend alone: boxes have no place there.
+    axis.plot([], [], color=content.colour, linewidth=4.0, label=content.name)

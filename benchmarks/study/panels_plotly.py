@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .panels import Band, Bars, Boxes, Line
+from .panels import Band, Bars, Boxes, Line, decades
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 _BACKGROUND: Final = "#ffffff"
 # What titles, legend and axis labels take beside the rows [px].
 _AROUND: Final = 120
+# Decades on a logarithmic axis beyond which only these are marked.
+_WIDE: Final = 2.5
 
 
 def to_plotly(figure: PanelFigure) -> Any:
@@ -30,7 +32,7 @@ def to_plotly(figure: PanelFigure) -> Any:
         shared_yaxes="rows" if figure.share_y else False,
         shared_xaxes="columns" if figure.share_x else False,
         horizontal_spacing=0.04 if figure.share_y else 0.2 / count,
-        vertical_spacing=min(0.09, 55.0 / height),
+        vertical_spacing=(45.0 if figure.share_x else 85.0) / height if len(figure.rows) > 1 else 0.0,
         subplot_titles=[panel.title if panel else "" for row in figure.rows for panel in row],
     )
     named: set[str] = set()
@@ -69,7 +71,8 @@ def _fill(made: Any, panel: Panel, i: int, j: int, named: set[str]) -> None:
             made.add_trace(trace, row=i, col=j)
     axis: dict[str, Any] = {}
     if panel.log_y:
-        axis |= {"type": "log", "exponentformat": "power", "dtick": 1}
+        wide = decades(panel) > _WIDE
+        axis |= {"type": "log", "exponentformat": "power" if wide else "none", "dtick": 1 if wide else "D2"}
     if panel.y_range is not None:
         axis["range"] = list(np.log10(panel.y_range)) if panel.log_y else list(panel.y_range)
     if axis:

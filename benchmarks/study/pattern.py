@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import polars as pl
 
-from ..metrics.motion import ON_LIMIT
 from .outcomes_table import operator_medians, values_of
 
 if TYPE_CHECKING:
@@ -17,11 +16,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .outcomes_table import OutcomeTest
-    from .provisional import GuidedRun
+    from ...control import GuidedRun
     from .result import StudyResult
 
     Array = NDArray[np.float64]
 
+# How close to its limit the joint counts as being at it [rad]: a hard stop leaves it up to one tick's motion short.
+AT_LIMIT: Final = np.deg2rad(0.1)
 # A limit counts as kept up to this share: rounding in a difference of commands.
 _ROUNDING: Final = 1e-6
 # The hard stop takes a tick: what the peak is of the speed lost over the period, at least and at most.
@@ -87,9 +88,9 @@ def verdicts(found: StudyResult, tests: Sequence[OutcomeTest]) -> tuple[Verdict,
 
 
 def at_limit(run: GuidedRun, joint: int, q_min: float, q_max: float) -> NDArray[np.bool_]:
-    """Ticks at which a joint is on one of its limits, shape (N,)."""
+    """Ticks at which a joint is within `AT_LIMIT` of one of its limits, shape (N,)."""
     q = run.q[:, joint]
-    return (q <= q_min + ON_LIMIT) | (q >= q_max - ON_LIMIT)
+    return (q <= q_min + AT_LIMIT) | (q >= q_max - AT_LIMIT)
 
 
 def _slides(found: StudyResult, letter: str) -> Verdict:
@@ -178,14 +179,14 @@ def _all_joints(found: StudyResult) -> Verdict:
 def _gentler(trials: pl.DataFrame) -> Verdict:
     medians = {
         key: {letter: float(np.median(values)) for letter, values in operator_medians(trials, key).items()}
-        for key in ("elbow_peak_qdd", "peak_torque", "peak_torque_rate")
+        for key in ("peak_qdd", "peak_torque", "peak_torque_rate")
     }
-    measured = "medians of A, B and C: " + "; ".join(
+    measured = "medians of A, B and C, peaks over joints: " + "; ".join(
         ", ".join(f"{by[letter]:.3g}" for letter in "ABC") + f" {unit}"
-        for by, unit in zip(medians.values(), ("rad/s² at the elbow", "Nm", "Nm/s"), strict=True)
+        for by, unit in zip(medians.values(), ("rad/s²", "Nm", "Nm/s"), strict=True)
     )
-    holds = all(by["C"] < by["A"] for by in medians.values())
-    return Verdict("C-gentler", "C", "C stresses the hardware less than A: acceleration, torque and its rate", measured, holds)
+    holds = all(by["C"] < min(by["A"], by["B"]) for by in medians.values())
+    return Verdict("C-gentler", "C", "C stresses the hardware least: peaks of acceleration, torque and its rate", measured, holds)
 
 
 def _same_time(tests: Sequence[OutcomeTest]) -> Verdict:

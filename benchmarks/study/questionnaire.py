@@ -67,6 +67,7 @@ SUBJECTS: Final = 42
 #: Section 5.4.1: chi-squared and p of A against C for each question, and the critical value at 5 %.
 PRINTED_CHI2: Final = (8.23, 0.76, 13.27)
 PRINTED_P: Final = (0.005, 0.25, 0.005)
+PRINTED_P_TEXT: Final = ("p ≈ 0.005", "p = 0.25", "p ≈ 0.005")
 PRINTED_CRITICAL: Final = 3.841
 LEVEL: Final = 0.05
 #: Section 5.4.1: "always produced very high chi-squared > 25 values in every comparison", said of B.

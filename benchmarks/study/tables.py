@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .outcomes_table import characters_of, letters_of
-from .questionnaire import PRINTED_PREFER_C, SUBJECTS
+from .questionnaire import PRINTED_P_TEXT, PRINTED_PREFER_C, SUBJECTS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,8 +26,8 @@ def number(value: float | None) -> str:
     """Three digits, without an exponent where that reads better."""
     if value is None:
         return _NOTHING
-    if value == 0.0:
-        return "0"
+    if value == round(value) and abs(value) < 1e3:
+        return f"{value:.0f}"
     if abs(value) >= 1e5 or abs(value) < 1e-3:
         return f"{value:.2e}"
     digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
@@ -48,14 +48,17 @@ def median_rows(found: Sequence[Medians], trials: pl.DataFrame) -> tuple[list[st
     ]
     heads = [letter if character == "all" else f"{letter}, {character}" for letter, character in columns]
 
-    def cell(estimate: Estimate | None) -> dict[str, str]:
-        if estimate is None:
+    def cell(estimate: Estimate | None, scale: float) -> dict[str, str]:
+        if estimate is None or estimate.value is None or estimate.low is None or estimate.high is None:
             return {"value": _NOTHING, "interval": ""}
         same = estimate.low == estimate.high
-        interval = "" if same else f"{number(estimate.low)} to {number(estimate.high)}"
-        return {"value": number(estimate.value), "interval": interval}
+        interval = "" if same else f"{number(scale * estimate.low)} to {number(scale * estimate.high)}"
+        return {"value": number(scale * estimate.value), "interval": interval}
 
-    rows = [{"name": one.outcome.label, "cells": [cell(one.by.get(key)) for key in columns]} for one in found]
+    rows = [
+        {"name": one.outcome.label, "cells": [cell(one.by.get(key), one.outcome.scale) for key in columns]}
+        for one in found
+    ]
     return heads, rows
 
 
@@ -95,7 +98,7 @@ def thesis_rows(checks: QuestionnaireChecks) -> list[dict[str, str]]:
 
 
 def _thesis_row(one: Comparison) -> dict[str, str]:
-    printed = f"{one.printed:.2f}, p = {one.printed_p:g}" if one.printed is not None else "> 25"
+    printed = f"{one.printed:.2f}, {PRINTED_P_TEXT[one.question]}" if one.printed is not None else "> 25"
     kind, said = {True: ("yes", "yes"), False: ("no", "no"), None: ("unknown", "depends")}[one.said]
     p = p_value(one.test.p_value) if one.completed_p is None else _range(*one.completed_p, p_value)
     return {

@@ -10,7 +10,7 @@
   const corners = data.runs.flatMap(run => run.points[0]).concat(data.path);
   const middle = [0, 1, 2].map(k => (Math.min(...corners.map(p => p[k])) + Math.max(...corners.map(p => p[k]))) / 2);
   const reach = Math.max(...corners.map(p => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
-  const camera = new Camera(middle, 3.1 * reach);
+  const camera = new Camera(middle, 3.9 * reach);
   const scenes = data.runs.map(run => new Scene(element(`scene-${run.letter}`), camera));
   let [now, playing, started, last] = [0, false, false, null];
 
@@ -41,10 +41,10 @@
       trace(scene, run, state);
       points.slice(1).forEach((p, i) => {
         const thin = i === points.length - 2;
-        scene.tube(points[i], p, thin ? 30 : 58, LINK);
+        scene.tube(points[i], p, thin ? 28 : 52, LINK);
       });
-      scene.ball(points[0], 80, JOINT);
-      points.slice(1, -1).forEach((p, i) => scene.ball(p, i + 1 === data.elbow ? 74 : 64, i + 1 === data.elbow && state.limit ? RED : JOINT));
+      scene.ball(points[0], 76, JOINT);
+      points.slice(1, -1).forEach((p, i) => scene.ball(p, i + 1 === data.elbow ? 70 : 58, i + 1 === data.elbow && state.limit ? RED : JOINT));
       scene.ball(tool, 26, run.colour);
       if (!state.done) scene.arrow(tool, state.force.map(value => 8 * value), STILL);
       scene.end();
@@ -94,12 +94,15 @@
     c.scale(ratio, ratio);
     const row = box.height / data.runs.length;
     data.runs.forEach((run, i) => {
-      run.points.forEach((_, k) => {
-        const x = (k / data.rate / END) * box.width;
-        c.fillStyle = run.still[k] ? STILL : run.limit[k] ? RED : run.colour;
-        c.globalAlpha = run.still[k] || run.limit[k] ? 0.9 : 0.35;
-        c.fillRect(x, i * row + 2, box.width / (END * data.rate) + 0.6, row - 4);
-      });
+      const kind = k => (run.still[k] ? 2 : run.limit[k]);
+      for (let from = 0, k = 1; k <= run.points.length; k++) {
+        if (k < run.points.length && kind(k) === kind(from)) continue;
+        const [begin, end] = [from, k].map(frame => (Math.min(frame / data.rate, run.duration) / END) * box.width);
+        c.fillStyle = [run.colour, RED, STILL][kind(from)];
+        c.globalAlpha = kind(from) ? 0.9 : 0.35;
+        c.fillRect(begin, i * row + 2, end - begin, row - 4);
+        from = k;
+      }
       c.globalAlpha = 1;
       c.fillStyle = "#1d2125";
       c.font = "600 11px system-ui, sans-serif";

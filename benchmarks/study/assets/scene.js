@@ -3,7 +3,7 @@
 
 class Camera {
   constructor(target, distance) {
-    this.home = { target, distance, azimuth: 0.62, elevation: 0.36 };
+    this.home = { target, distance, azimuth: 0.62, elevation: 0.3 };
     this.reset();
   }
   reset() { Object.assign(this, { ...this.home }); }

@@ -1,4 +1,4 @@
-"""A small study for the tests of its page: real runs of the three algorithms, under a hand that goes on regardless."""
+"""A small study for the tests of its page: one real run of each algorithm, and trials scattered around their measures."""
 
 from functools import cache
 
@@ -7,38 +7,20 @@ import polars as pl
 
 from kinqp.benchmarks import get_scenario
 from kinqp.benchmarks.study import ALGORITHMS, StudyResult, StudySettings
-from kinqp.benchmarks.study.provisional import GuidedRun
 from kinqp.benchmarks.study.result import TRIAL_COLUMNS
-from kinqp.control import Trajectory, make_step, simulate
-from kinqp.formulations import Mode
+from kinqp.control import EXPERT, GuidedRun, Operator, make_guiding, simulate_guiding
 
 SCENARIO = get_scenario("semicircle")
 OPERATORS, TRIALS = 6, 2
 # Coarser than a controller runs, to be quick.
-DT = 2e-3
-MODE = Mode.fix_orientation()
+DT = 5e-3
 
 
 def _run(algorithm: str) -> GuidedRun:
     (phase,) = SCENARIO.phases
-    step = make_step(SCENARIO.robot, algorithm, MODE)
-    return _guided(simulate(step, phase.guide, SCENARIO.q0, phase.duration, dt=DT))
-
-
-def _guided(found: Trajectory) -> GuidedRun:
-    count, robot = len(found.t), SCENARIO.robot
-    twist = np.array([robot.jacobian(q) @ qd for q, qd in zip(found.q, found.qd, strict=True)])
-    v, actual = np.zeros((count, 6)), twist.copy()
-    v[:, list(MODE.free_rows)] = found.v
-    wrench = np.zeros((count, 6))
-    wrench[:, :3] = 60.0 * found.v
-    return GuidedRun(
-        t=found.t, q=found.q, qd=found.qd, position=found.position,
-        rotation=np.tile(robot.pose(SCENARIO.q0)[:3, :3], (count, 1, 1)), wrench=wrench, twist=twist, v=v,
-        v_actual=actual, status=found.status, mode=("fix-orientation",) * count, phase=("guiding",) * count,
-        active=found.active, iterations=found.iterations, drift=np.zeros((count, 2)),
-        yielded=np.zeros(count, dtype=bool), dt=DT, robot=robot, q_end=found.q_end,
-    )  # fmt: skip
+    controller = make_guiding(SCENARIO.robot, algorithm, ["fix-orientation"], dt=DT)
+    hand = Operator(phase.guide.path, EXPERT, seed=5, stance=(1.0, 0.0, 0.0))
+    return simulate_guiding(controller, hand, SCENARIO.q0, 20.0)
 
 
 def torques_of(run: GuidedRun) -> np.ndarray:
