@@ -34,11 +34,14 @@ class Resolved:
         Passes that it took, as the method counts them.
     held : ndarray, shape (nv,), or None
         +1 where the method holds the joint at its upper side, -1 at its lower one, 0 elsewhere.
+    sigma_min : float or None
+        As `Situation.sigma_min`, where the method found it on its way.
     """
 
     qd: Array
     iterations: int = 1
     held: Array | None = None
+    sigma_min: float | None = None
 
     @property
     def active(self) -> tuple[str, ...]:

@@ -40,6 +40,10 @@ class Factors:
         """Number of singular values that count."""
         return len(self.sigma)
 
+    def smallest(self) -> float | None:
+        """Smallest singular value of M, where M has full row rank; otherwise it may have been dropped."""
+        return float(self.sigma[-1]) if 0 < len(self.U) == self.rank else None
+
     def solve(self, rhs: Array) -> Array:
         """Least-norm least-squares solution M^+ `rhs`, shape (n,)."""
         solution: Array = self.V @ ((self.U.T @ rhs) / self.sigma)
@@ -86,10 +90,13 @@ class Prioritised:
         Joint velocity [rad/s or m/s].
     null : ndarray, shape (nv, d)
         Orthonormal basis of the motions that no task sees.
+    factors : tuple of Factors
+        Of each task's rows, in the null space of those before it.
     """
 
     qd: Array
     null: Array
+    factors: tuple[Factors, ...]
 
 
 def prioritise(tasks: Iterable[tuple[Array, Array]], basis: Array) -> Prioritised:
@@ -110,11 +117,13 @@ def prioritise(tasks: Iterable[tuple[Array, Array]], basis: Array) -> Prioritise
         not frozen.
     """
     qd, Z = np.zeros(len(basis)), basis
+    found: list[Factors] = []
     for J, xd in tasks:
         factors = factor(J @ Z, size_of(J))
         qd = qd + Z @ factors.solve(xd - J @ qd)
         Z = Z @ factors.null
-    return Prioritised(qd, Z)
+        found.append(factors)
+    return Prioritised(qd, Z, tuple(found))
 
 
 def largest_scale(start: Array, change: Array, lower: Array, upper: Array) -> float:

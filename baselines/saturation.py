@@ -101,15 +101,18 @@ def saturate(problem: Problem) -> Level:
     best = Level(p.start, 0.0, held, 1)
     for iteration in range(1, len(p.start) + 2):
         chosen = held != 0.0
-        bound = np.where(held > 0.0, p.upper, p.lower)
-        saturating = factor(p.Z[chosen], 1.0)
-        task = factor(p.J @ p.Z @ saturating.null, scale_of_J) if chosen.any() else p.factors
-        if saturating.rank < int(chosen.sum()) or task.rank < p.factors.rank:
-            break
-        rest = p.start + p.Z @ saturating.solve((bound - p.start)[chosen])
-        to_task = p.Z @ saturating.null
-        a = to_task @ task.solve(p.wanted)
-        b = rest + to_task @ task.solve(p.J @ (p.start - rest))
+        if iteration == 1:
+            a, b = p.Z @ p.factors.solve(p.wanted), p.start
+        else:
+            bound = np.where(held > 0.0, p.upper, p.lower)
+            saturating = factor(p.Z[chosen], 1.0)
+            task = factor(p.J @ p.Z @ saturating.null, scale_of_J)
+            if saturating.rank < int(chosen.sum()) or task.rank < p.factors.rank:
+                break
+            rest = p.start + p.Z @ saturating.solve((bound - p.start)[chosen])
+            to_task = p.Z @ saturating.null
+            a = to_task @ task.solve(p.wanted)
+            b = rest + to_task @ task.solve(p.J @ (p.start - rest))
         over = np.where(chosen, 0.0, np.maximum(a + b - p.upper, p.lower - a - b) - OVER)
         if not (over > 0.0).any():
             return Level(a + b, 1.0, held, iteration)

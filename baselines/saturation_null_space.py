@@ -70,8 +70,9 @@ class SaturationNullSpace(Baseline):
     def resolve(self, at: Situation) -> Resolved:
         """Compute the command."""
         tasks = with_posture(at, self.posture_gain)
-        levels = saturate_tasks(tasks, at.qd_lo, at.qd_hi, variant=self.variant)
-        return Resolved(levels[-1].qd, sum(level.iterations for level in levels), levels[-1].held)
+        problems, levels = _in_order(tasks, at.qd_lo, at.qd_hi, self.variant)
+        passes = sum(level.iterations for level in levels)
+        return Resolved(levels[-1].qd, passes, levels[-1].held, problems[1].factors.smallest())
 
 
 def saturate_tasks(
@@ -93,10 +94,18 @@ def saturate_tasks(
     tuple of Level
         One for each task; the last one's `qd` is the command.
     """
+    return tuple(_in_order(tasks, lower, upper, variant)[1])
+
+
+def _in_order(
+    tasks: Sequence[tuple[Array, Array]], lower: Array, upper: Array, variant: str
+) -> tuple[list[Problem], list[Level]]:
+    """State and solve one task after the other."""
     qd, Z = np.zeros(len(lower)), np.eye(len(lower))
+    problems: list[Problem] = []
     levels: list[Level] = []
     for J, xd in tasks:
-        problem = Problem.state(J, xd, qd, Z, (lower, upper))
-        levels.append(VARIANTS[variant](problem))
-        qd, Z = levels[-1].qd, problem.left
-    return tuple(levels)
+        problems.append(Problem.state(J, xd, qd, Z, (lower, upper)))
+        levels.append(VARIANTS[variant](problems[-1]))
+        qd, Z = levels[-1].qd, problems[-1].left
+    return problems, levels

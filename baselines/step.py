@@ -126,7 +126,7 @@ class BaselineStep:
             active=resolved.active if solved else (),
             fixed_error=kept.fixed_error,
             bound_violation=kept.bound_violation,
-            sigma_min=at.sigma_min(),
+            sigma_min=at.sigma_min() if resolved.sigma_min is None else resolved.sigma_min,
             setup_time=0.0,
             solve_time=time,
             message=message,

@@ -64,9 +64,13 @@ class TaskPriority(Baseline):
         tasks = with_posture(at, self.posture_gain)
         held = np.zeros(at.nv)
         passes = 0
+        sigma_min = None
         for _ in range(at.nv + 1):
             passes += 1
-            qd = prioritise(tasks, np.eye(at.nv)[:, held == 0.0]).qd
+            found = prioritise(tasks, np.eye(at.nv)[:, held == 0.0])
+            qd = found.qd
+            if passes == 1:
+                sigma_min = found.factors[1].smallest()
             if self.limits == "none":
                 break
             ahead = at.q + at.dt * qd
@@ -75,4 +79,4 @@ class TaskPriority(Baseline):
             if not beyond.any():
                 break
             held = np.where(held == 0.0, beyond, held)
-        return Resolved(qd, passes, held)
+        return Resolved(qd, passes, held, sigma_min)

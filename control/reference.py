@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from .hand import length
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -67,10 +69,11 @@ class WaitingReference:
         One step of the fixed-point iteration s <- s + (x - p(s)) . t(s), whose error shrinks by the ratio of deviation
         and radius of curvature: a tool moves little in a control period.
         """
-        path = self.path
-        along = float((position - path.point(self.tool)) @ path.tangent(self.tool))
-        self.tool = min(max(self.tool + along, 0.0), path.length)
-        deviation: Array = position - path.point(self.tool)
+        path, before = self.path, self.tool
+        away, tangent = position - path.point(before), path.tangent(before)
+        self.tool = min(max(before + float(away @ tangent), 0.0), path.length)
+        # As seen from the point found; what the path bends by in one step is of second order.
+        deviation: Array = away - (self.tool - before) * tangent
         return deviation
 
     def advance(self, dt: float, lead: float) -> None:
@@ -90,9 +93,9 @@ def normal_of(path: Path, s: float) -> Array:
     tangent, step = path.tangent(s), 1e-3 * path.length
     change = path.tangent(min(s + step, path.length)) - path.tangent(max(s - step, 0.0))
     change = change - (change @ tangent) * tangent
-    if float(np.sqrt(change @ change)) < 1e-6:
+    if length(change) < 1e-6:
         # Straight: the axis of the world that is least along it.
         change = np.eye(3)[int(np.argmin(np.abs(tangent)))]
         change = change - (change @ tangent) * tangent
-    normal: Array = change / np.sqrt(change @ change)
+    normal: Array = change / length(change)
     return normal

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from .hand import length
 from .reference import normal_of
 
 if TYPE_CHECKING:
@@ -126,14 +127,14 @@ class Steering:
     def follow(self, dt: float, deviation: Array) -> None:
         """Go along with the tool's deviation as it was felt, shape (3,) [m], for `dt` [s]."""
         c = self._character
-        pressed = c.stiffness * float(np.sqrt(deviation @ deviation))
+        pressed = c.stiffness * length(deviation)
         share = 1.0 - c.press / pressed if pressed > c.press else 0.0
         self.offset = self.offset + min(dt / _FOLLOW, 1.0) * (share * deviation - self.offset)
 
     def towards_goal(self, t: float, dt: float, aim: Array) -> Array:
         """Move the aim on for `dt` [s] while backing off, shape (3,) [m]; it takes up speed and settles smoothly."""
         way = self._goal - aim
-        distance = float(np.sqrt(way @ way))
+        distance = length(way)
         speed = self._character.steer_speed * min((t - self._began) / _TAKE_UP, 1.0)
         share = min(dt * speed / distance, dt / _SETTLE, 1.0) if distance > 0.0 else 0.0
         moved: Array = aim + share * way
@@ -143,8 +144,7 @@ class Steering:
         """Whether the aim has been moved back, and a reaction time given to the tool to come after it."""
         if self.doing is not Doing.BACKING_OFF:
             return False
-        way = self._goal - aim
-        if float(way @ way) > _REACHED**2:
+        if length(self._goal - aim) > _REACHED:
             self._since = t
         return t - self._since >= self._character.reaction_time
 

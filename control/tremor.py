@@ -54,9 +54,10 @@ class Tremor:
         rng = np.random.default_rng(seed)
         parts = np.arange(_LINES) + rng.random((axes, _LINES))
         self._omega: Final[Array] = 2.0 * np.pi * (low + (high - low) * parts / _LINES)
+        self._amplitude: Final[Array] = np.full(_LINES, np.sqrt(2.0 / _LINES))
         self._phase: Final[Array] = 2.0 * np.pi * rng.random((axes, _LINES))
 
     def __call__(self, t: float) -> Array:
         """Give the noise at time `t` [s], shape (axes,), of unit RMS."""
-        noise: Array = np.sqrt(2.0 / _LINES) * np.sin(self._omega * t + self._phase).sum(axis=1)
+        noise: Array = np.sin(self._omega * t + self._phase) @ self._amplitude
         return noise

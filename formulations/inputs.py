@@ -65,12 +65,15 @@ def complete_inputs(specs: Sequence[Input], given: Mapping[str, ArrayLike], mode
     values: dict[str, Array] = {}
     for name, spec in known.items():
         if name in given:
-            values[name] = np.broadcast_to(check_input(spec, given[name], mode), (spec.size,))
+            value = check_input(spec, given[name], mode)
+            values[name] = value if value.ndim else np.full(spec.size, value)
         elif spec.default is not None:
             values[name] = spec.default
         else:
             raise InputError(f"{name}: expected {describe_input(spec, mode)}, got nothing")
-    if {"q_min", "q_max"} <= values.keys() and (values["q_min"] > values["q_max"]).any():
+    # The defaults are in order.
+    limited = ("q_min" in given or "q_max" in given) and {"q_min", "q_max"} <= values.keys()
+    if limited and (values["q_min"] > values["q_max"]).any():
         low, high = values["q_min"], values["q_max"]
         raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
     return values

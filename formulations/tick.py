@@ -58,7 +58,7 @@ class Input:
     positive: bool = False
     may_be_infinite: bool = False
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of entries."""
         return int(self.symbol.size1())
