@@ -26,6 +26,7 @@ from ..benchmarks import (
     sweep,
     sweep_table,
 )
+from ..benchmarks.study import StudyError
 from ..benchmarks.worst_case import CaseError
 from ..codegen import CurvatureError, ExportError, export_c
 from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
@@ -36,6 +37,7 @@ from ..solvers.plugins import PluginError
 from .davinci import run_davinci
 from .interrupt import interruptible
 from .report import run_compare, run_report
+from .study import run_study
 from .worst_case import run_worst_case
 
 if TYPE_CHECKING:
@@ -58,6 +60,7 @@ USER_ERRORS = (
     ReportError,
     RobotError,
     StoreError,
+    StudyError,
     UnknownOptionError,
     OSError,
 )
@@ -74,6 +77,7 @@ app = typer.Typer(
 app.command("report")(run_report)
 app.command("compare")(run_compare)
 app.command("davinci")(run_davinci)
+app.command("study")(run_study)
 app.command("worst-case")(run_worst_case)
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ...control import SemicirclePath
-from ...control.steering import PULLING, STILL
+from .outcomes import standing_ticks
 from .outcomes_table import Medians, OutcomeTest, medians, outcome_tests
 from .pattern import Verdict, verdicts
+from .plan import path_of
 from .questionnaire_checks import QuestionnaireChecks, check_questionnaire
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from .result import StudyResult
 
     Array = NDArray[np.float64]
+
+# Of the path that is drawn.
+_PATH_POINTS: Final = 241
 
 
 @dataclass(frozen=True)
@@ -83,25 +86,14 @@ class Findings:
         }  # fmt: skip
 
 
-def _path(study: StudyResult) -> Array:
-    settings = study.settings
-    start = study.runs["A"].robot.pose(settings.q0)[:3, 3]
-    path = SemicirclePath(start, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]), settings.radius)
-    return np.array([path.point(s) for s in np.linspace(0.0, path.length, 121)])
-
-
-def standing(run):
-    return (np.linalg.norm(run.twist[:, :3], axis=1) < STILL) & (np.linalg.norm(run.wrench[:, :3], axis=1) > PULLING)
-
-
 def analyse(study: StudyResult, conditions: Mapping[str, str]) -> Findings:
     """Compute all that is said of a study."""
-    tests = outcome_tests(study.trials)
+    tests, path = outcome_tests(study.trials), path_of(study.settings)
     return Findings(
         study=study,
         conditions=dict(conditions),
-        path=_path(study),
-        still={letter: standing(run) for letter, run in study.runs.items()},
+        path=np.array([path.point(s) for s in np.linspace(0.0, path.length, _PATH_POINTS)]),
+        still={letter: standing_ticks(run) for letter, run in study.runs.items()},
         medians=medians(study.trials),
         tests=tests,
         verdicts=verdicts(study, tests),

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 # The measured outcomes that come closest to what each question asks for.
 _NEAREST: Final = (("path_error_rms", "work_against"), ("time", "standing"), ("stops", "elbow_peak_qdd"))
-_SHORT: Final = ("easy and natural", "satisfied by the time", "no unexpected movements or stops")
+_SHORT: Final = ("easy and natural", "satisfied by the time", "nothing unexpected")
 _SCORES: Final = tuple(str(score) for score in range(1, 6))
 _COLUMNS: Final = 3
 

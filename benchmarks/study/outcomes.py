@@ -41,14 +41,21 @@ def joint_torques(run: GuidedRun) -> Array:
     return torques
 
 
+def standing_ticks(run: GuidedRun) -> NDArray[np.bool_]:
+    """Ticks at which the tool stands still although the hand pulls, shape (N,); not those of a moment only."""
+    speed = np.linalg.norm(run.twist[:, :3], axis=1)
+    still: NDArray[np.bool_] = (speed < STILL) & (np.linalg.norm(run.wrench[:, :3], axis=1) > PULL)
+    edges = np.diff(np.concatenate(([False], still, [False])).astype(int))
+    for begin, end in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
+        still[begin:end] = (end - begin) * run.dt >= LASTING - 0.5 * run.dt
+    return still
+
+
 def stops_of(run: GuidedRun) -> tuple[int, float]:
     """How often the tool stood still although the hand pulled, and for how long in all [s]."""
-    speed = np.linalg.norm(run.twist[:, :3], axis=1)
-    still = (speed < STILL) & (np.linalg.norm(run.wrench[:, :3], axis=1) > PULL)
-    edges = np.diff(np.concatenate(([False], still, [False])).astype(int))
-    lasting = (np.flatnonzero(edges < 0) - np.flatnonzero(edges > 0)) * run.dt
-    lasting = lasting[lasting >= LASTING - 0.5 * run.dt]
-    return len(lasting), float(lasting.sum())
+    still = standing_ticks(run)
+    begins = int(np.count_nonzero(np.diff(still.astype(int), prepend=0) > 0))
+    return begins, float(np.count_nonzero(still)) * run.dt
 
 
 def path_error(run: GuidedRun, path: Path) -> float:

@@ -7,7 +7,7 @@
   const RED = "#c62828", STILL = "#22313f", LINK = "#c3c9d1", JOINT = "#7d8793";
   const element = id => document.getElementById(id);
   const [play, slider, clock, speed] = ["play", "slider", "time", "speed"].map(element);
-  const corners = data.runs.flatMap(run => run.points[0]).concat(data.path);
+  const corners = data.runs.flatMap(run => run.points.filter((_, i) => i % 10 === 0).flat()).concat(data.path);
   const middle = [0, 1, 2].map(k => (Math.min(...corners.map(p => p[k])) + Math.max(...corners.map(p => p[k]))) / 2);
   const reach = Math.max(...corners.map(p => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
   const camera = new Camera(middle, 3.9 * reach);
