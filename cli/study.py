@@ -54,14 +54,13 @@ def run_study(
         again = f"kinqp study --out {out} --operators {operators} --trials {trials} --seed {seed} --resume"
         console.print(f"Interrupted; {out} keeps all trials done. Next: {again}", markup=False)
         raise typer.Exit(130) from None
-    for one in written.findings.verdicts:
-        console.print(f"{_MARKS[one.holds]}: {one.expected}: {one.measured}", markup=False)
+    for verdict in written.findings.verdicts:
+        console.print(f"{_MARKS[verdict.holds]}: {verdict.expected}: {verdict.measured}", markup=False)
     for one in written.findings.questionnaire.comparisons:
         if one.printed is not None:
             value = one.completed[0] if one.completed else one.test.statistic
-            console.print(
-                f"thesis, question {one.question + 1}, A and C: chi-squared {value:.2f}, printed {one.printed}", markup=False
-            )
+            told = f"thesis, question {one.question + 1}, A and C: chi-squared {value:.2f}, printed {one.printed:.2f}"
+            console.print(told, markup=False)
     console.print(
         f"Wrote index.html ({written.page.stat().st_size / 1e6:.1f} MB), summary.json, trials.parquet, runs and "
         f"{len(written.figures)} figures to {out}. Next: open {written.page} in a browser; it needs no network.",

@@ -48,9 +48,7 @@ def run_and_write(
     now, path = conditions(), folder / _CONDITIONS
     if overwrite:
         path.unlink(missing_ok=True)
-    study = run_study(
-        settings, folder, processes=processes, resume=resume, overwrite=overwrite, on_trial=on_trial
-    )
+    study = run_study(settings, folder, processes=processes, resume=resume, overwrite=overwrite, on_trial=on_trial)
     if not path.exists():
         write_whole(path, (json.dumps(now, indent=1) + "\n").encode())
     known: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .panels import Content
     from ...control import GuidedRun
+    from .panels import Content
     from .result import StudyResult, StudySettings
 
     Array = NDArray[np.float64]
@@ -73,9 +73,7 @@ def joint_figure(found: StudyResult, *, buckets: int = _BUCKETS) -> PanelFigure:
 
 
 def elbow_figure(found: StudyResult, *, buckets: int = 2 * _BUCKETS) -> PanelFigure:
-    """The elbow: position with its limits, velocity in its bounds, acceleration with its limit, and that again as a
-    logarithm (thesis, section 5.3.4).
-    """
+    """The elbow's position and limit, velocity and bounds, acceleration and limit, also as a logarithm (5.3.4)."""
     settings, elbow = found.settings, found.settings.elbow
     columns = [
         _elbow_column(letter, run, settings, elbow, buckets, title=column_title(letter, settings))
@@ -115,9 +113,7 @@ def _elbow_column(
     every = max(1, len(run.t) // (2 * buckets))
     lower, upper = elbow_bounds(q[::every], settings)
     shown = 1.25 * max(float(np.max(np.abs(qd))), 0.05)
-    band = Band(
-        "admissible velocities", run.t[::every], np.maximum(lower, -shown), np.minimum(upper, shown)
-    )
+    band = Band("admissible velocities", run.t[::every], np.maximum(lower, -shown), np.minimum(upper, shown))
     size = np.maximum(np.abs(qdd), _FLOOR)
     return (
         Panel(title, "time [s]", "position [°]", (curve(_DEG * q), *limit(nearest))),
@@ -151,7 +147,9 @@ def elbow_phase_figure(found: StudyResult) -> PanelFigure:
         changes = np.append(True, (np.abs(np.diff(q)) > 1e-6) | (np.abs(np.diff(qd)) > 1e-6) | np.diff(near))
         line = Line(letter, q[changes], qd[changes], ALGORITHM_COLOURS[letter], width=1.6)
         panels.append(
-            Panel(column_title(letter, settings), "position [°]", "velocity [rad/s]", (band, line), y_range=(-most, most))
+            Panel(
+                column_title(letter, settings), "position [°]", "velocity [rad/s]", (band, line), y_range=(-most, most)
+            )
         )
     return PanelFigure(
         "elbow-phase",
@@ -167,7 +165,9 @@ def elbow_phase_figure(found: StudyResult) -> PanelFigure:
 def elbow_bounds(q: Array, settings: StudySettings) -> tuple[Array, Array]:
     """Smallest and largest admissible velocity of the elbow at positions of shape (N,) [rad]: (N,) each [rad/s]."""
     at, elbow = ca.SX.sym("q"), settings.elbow
-    limits = (settings.q_min[elbow], settings.q_max[elbow], settings.qd_max[elbow], settings.qdd_max[elbow])
-    both = velocity_bounds("viable", at, *(ca.SX(value) for value in limits), ca.SX(settings.dt))
+    q_min, q_max, qd_max, qdd_max = (
+        ca.SX(limits[elbow]) for limits in (settings.q_min, settings.q_max, settings.qd_max, settings.qdd_max)
+    )
+    both = velocity_bounds("viable", at, q_min, q_max, qd_max, qdd_max, ca.SX(settings.dt))
     lower, upper = ca.Function("bounds", [at], list(both))(np.asarray(q)[None, :])
     return np.array(lower).ravel(), np.array(upper).ravel()

@@ -124,7 +124,9 @@ def values_of(trials: pl.DataFrame, key: str, **chosen: str) -> Array:
 def operator_medians(trials: pl.DataFrame, key: str) -> dict[str, Array]:
     """Median of each operator's trials, shape (operators,), by algorithm."""
     medians = (
-        trials.group_by("algorithm", "operator").agg(pl.col(key).cast(pl.Float64).median()).sort("algorithm", "operator")
+        trials.group_by("algorithm", "operator")
+        .agg(pl.col(key).cast(pl.Float64).median())
+        .sort("algorithm", "operator")
     )
     return {letter: values_of(medians, key, algorithm=letter) for letter in letters_of(trials)}
 

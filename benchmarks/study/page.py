@@ -15,10 +15,10 @@ from .animation import animation
 from .limitations import limitations
 from .motion_figures import elbow_figure, elbow_phase_figure, joint_figure
 from .outcome_figures import outcome_figure, questionnaire_figure
-from .outcomes_table import letters_of
 from .panels import ALGORITHM_COLOURS
 from .panels_plotly import to_plotly
 from .pattern import LEVEL
+from .tables import NOTHING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -128,9 +128,9 @@ def _chart(described: PanelFigure) -> dict[str, Any]:
 def _lead(settings: StudySettings) -> str:
     count = " and ".join(f"{count} {name}s" for name, count in settings.counts.items() if count)
     return (
-        f"{settings.operators} simulated operators ({count}), {settings.trials} trials each with every algorithm, in random order, on the "
-        f"{settings.robot}: the experiment of chapter 5 of A. Spinoglio's thesis, again, measured at every tick of "
-        f"{1e3 * settings.dt:g} ms."
+        f"{settings.operators} simulated operators ({count}), {settings.trials} trials each with every algorithm, in "
+        f"random order, on the {settings.robot}: the experiment of chapter 5 of A. Spinoglio's thesis, again, measured "
+        f"at every tick of {1e3 * settings.dt:g} ms."
     )
 
 
@@ -181,7 +181,7 @@ def _characters(settings: StudySettings) -> dict[str, Any]:
     names = list(settings.characters)
     keys = list(dict.fromkeys(key for fields in settings.characters.values() for key in fields))
     rows = [
-        {"name": key.replace("_", " "), "cells": [f"{settings.characters[name].get(key, '–')}" for name in names]}
+        {"name": key.replace("_", " "), "cells": [f"{settings.characters[name].get(key, NOTHING)}" for name in names]}
         for key in keys
     ]
     return {"names": names, "rows": rows}

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-
 from matplotlib.ticker import LogLocator, NullLocator
 
 from ..report.paper.style import DASHES, figure
@@ -51,9 +50,7 @@ def to_paper(described: PanelFigure) -> Figure:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     if handles:
-        made.legend(
-            list(handles.values()), list(handles), loc="outside lower center", ncols=min(len(handles), 8)
-        )
+        made.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=min(len(handles), 8))
     return made
 
 

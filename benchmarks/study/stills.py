@@ -56,16 +56,17 @@ def arm_figure(found: Findings) -> Figure:
     _frame(axes, np.concatenate(corners))
     # The layout engines leave no room for a title in three dimensions.
     made.subplots_adjust(left=0.02, right=0.97, bottom=0.14, top=0.88, wspace=0.12)
-    handles = {
-        label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)
-    }
+    handles = {label: handle for axis in axes for handle, label in zip(*axis.get_legend_handles_labels(), strict=True)}
     made.legend(list(handles.values()), list(handles), loc="lower center", ncols=len(handles))
     return made
 
 
 def _trace(axis: Any, position: Array, on: NDArray[np.bool_], letter: str) -> None:
     at = np.unique(np.linspace(0, len(position) - 1, _TRACE_POINTS).astype(int))
-    for name, shown, look in ((f"tool, {letter}", ~on[at], ALGORITHM_COLOURS[letter]), ("elbow at its limit", on[at], LIMIT_COLOUR)):
+    for name, shown, look in (
+        (f"tool, {letter}", ~on[at], ALGORITHM_COLOURS[letter]),
+        ("elbow at its limit", on[at], LIMIT_COLOUR),
+    ):
         x, y, z = np.where(shown[:, None], position[at], np.nan).T
         axis.plot(x, y, z, color=look, linewidth=1.6, label=name)
 

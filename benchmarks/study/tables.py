@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from .questionnaire_checks import Comparison, QuestionnaireChecks
     from .result import StudyResult
 
-_NOTHING = "–"
+#: What stands where there is no number.
+NOTHING = "\N{EN DASH}"
 
 
 def number(value: float | None) -> str:
     """Three digits, without an exponent where that reads better."""
     if value is None:
-        return _NOTHING
+        return NOTHING
     if value == round(value) and abs(value) < 1e3:
         return f"{value:.0f}"
     if abs(value) >= 1e5 or abs(value) < 1e-3:
@@ -37,20 +38,18 @@ def number(value: float | None) -> str:
 def p_value(value: float | None) -> str:
     """A p-value in two digits."""
     if value is None:
-        return _NOTHING
+        return NOTHING
     return f"{value:.1e}" if value < 1e-3 else f"{value:.2g}"
 
 
 def median_rows(found: Sequence[Medians], trials: pl.DataFrame) -> tuple[list[str], list[dict[str, Any]]]:
     """Heads and rows of the medians: all operators by algorithm, then each character."""
-    columns = [
-        (letter, character) for character in ("all", *characters_of(trials)) for letter in letters_of(trials)
-    ]
+    columns = [(letter, character) for character in ("all", *characters_of(trials)) for letter in letters_of(trials)]
     heads = [letter if character == "all" else f"{letter}, {character}" for letter, character in columns]
 
     def cell(estimate: Estimate | None, scale: float) -> dict[str, str]:
         if estimate is None or estimate.value is None or estimate.low is None or estimate.high is None:
-            return {"value": _NOTHING, "interval": ""}
+            return {"value": NOTHING, "interval": ""}
         same = estimate.low == estimate.high
         interval = "" if same else f"{number(scale * estimate.low)} to {number(scale * estimate.high)}"
         return {"value": number(scale * estimate.value), "interval": interval}
@@ -70,7 +69,7 @@ def test_rows(found: Sequence[OutcomeTest], level: float) -> tuple[list[str], li
     for one in found:
         row = rows.setdefault(one.outcome.key, {"name": one.outcome.label, "cells": []})
         rough = "*" if one.test.p_value is not None and one.test.smallest_expected < 5.0 else ""
-        text = _NOTHING if one.test.statistic is None else f"{one.test.statistic:.2f}, {p_value(one.holm)}{rough}"
+        text = NOTHING if one.test.statistic is None else f"{one.test.statistic:.2f}, {p_value(one.holm)}{rough}"
         row["cells"].append({"text": text, "sure": one.holm is not None and one.holm < level})
     return heads, list(rows.values())
 
@@ -86,9 +85,11 @@ def extreme_rows(found: StudyResult) -> list[dict[str, Any]]:
     for name, unit, values, limits in kinds:
         largest = [np.max(np.abs(values(letter, run)), axis=0) for letter, run in found.runs.items()]
         for joint, limit in enumerate(limits):
-            cells = [{"text": number(float(one[joint])), "bad": bool(one[joint] > limit * (1 + 1e-6))} for one in largest]
+            cells = [
+                {"text": number(float(one[joint])), "bad": bool(one[joint] > limit * (1 + 1e-6))} for one in largest
+            ]
             label = f"joint {joint + 1}: {name} [{unit}]"
-            rows.append({"name": label, "cells": cells, "limit": number(limit) if np.isfinite(limit) else _NOTHING})
+            rows.append({"name": label, "cells": cells, "limit": number(limit) if np.isfinite(limit) else NOTHING})
     return rows
 
 
@@ -116,7 +117,7 @@ def _thesis_row(one: Comparison) -> dict[str, str]:
 
 def number_2(value: float | None) -> str:
     """Two decimals, as the thesis prints chi-squared."""
-    return _NOTHING if value is None else f"{value:.2f}"
+    return NOTHING if value is None else f"{value:.2f}"
 
 
 def _range(low: float, high: float, text: Any) -> str:
@@ -133,9 +134,10 @@ def thesis_notes(checks: QuestionnaireChecks) -> list[str]:
     open_ = [one for one in checks.comparisons if one.printed is None and one.said is None]
     notes = [
         f"Question 3 of algorithm A lists {SUBJECTS - completion.missing} answers of {SUBJECTS}. As listed they give "
-        f"{number_2(short.test.statistic)}, not {number_2(short.printed)}. The printed value comes out when none of the "
-        f"{completion.missing} missing answers is a 5, whatever they are otherwise: {len(completion.reproducing)} of the "
-        f"{completion.tried} ways to complete the row. With a 5 among them it would be less ({fives}).",
+        f"{number_2(short.test.statistic)}, not {number_2(short.printed)}. The printed value comes out when none of "
+        f"the {completion.missing} missing answers is a 5, whatever they are otherwise: in "
+        f"{len(completion.reproducing)} of the {completion.tried} ways to complete the row. With a 5 among them it "
+        f"would be less ({fives}).",
         "The printed p-values are columns of a table of critical values rather than p-values: chi-squared is "
         f"{columns}. So “p ≈ 0.005” reads p < 0.005, and “p = 0.25” reads p > 0.25; the values themselves are in the "
         "table above. No verdict at 5 % changes.",
@@ -157,7 +159,7 @@ def thesis_notes(checks: QuestionnaireChecks) -> list[str]:
         f"Nine tests are made without correction. With Holm's, the same {significant} of them stay below 0.05.",
         "Each subject scored all three algorithms; the median test takes the scores for independent ones, and does not "
         "use the pairing.",
-        f"{100 * PRINTED_PREFER_C:.0f} % ranked C first (32 of {SUBJECTS}); the counts of figure 5.9 are not printed, so "
-        "they are not drawn here.",
+        f"{100 * PRINTED_PREFER_C:.0f} % ranked C first (32 of {SUBJECTS}); the counts of figure 5.9 are not printed, "
+        "so they are not drawn here.",
     ]
     return notes

@@ -10,7 +10,7 @@
   const corners = data.runs.flatMap(run => run.points.filter((_, i) => i % 10 === 0).flat()).concat(data.path);
   const middle = [0, 1, 2].map(k => (Math.min(...corners.map(p => p[k])) + Math.max(...corners.map(p => p[k]))) / 2);
   const reach = Math.max(...corners.map(p => Math.hypot(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2])));
-  const camera = new Camera(middle, 3.9 * reach);
+  const camera = new Camera(middle, 3.45 * reach);
   const scenes = data.runs.map(run => new Scene(element(`scene-${run.letter}`), camera));
   let [now, playing, started, last] = [0, false, false, null];
 

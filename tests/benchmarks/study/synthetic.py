@@ -1,4 +1,4 @@
-"""A small study for the tests of its page: one real run of each algorithm, and trials scattered around their measures."""
+"""A small study to draw: one real run of each algorithm, and trials scattered around their measures."""
 
 from functools import cache
 
@@ -11,7 +11,7 @@ from kinqp.benchmarks.study.result import TRIAL_COLUMNS
 from kinqp.control import EXPERT, GuidedRun, Operator, make_guiding, simulate_guiding
 
 SCENARIO = get_scenario("semicircle")
-OPERATORS, TRIALS = 6, 2
+OPERATORS, TRIALS = 8, 2
 # Coarser than a controller runs, to be quick.
 DT = 5e-3
 
@@ -59,12 +59,20 @@ def trials(runs: dict[str, GuidedRun], torques: dict[str, np.ndarray]) -> pl.Dat
                 near = {name: float(value * rng.uniform(0.9, 1.0)) for name, value in measured.items()}
                 rows.append(
                     {
-                        "algorithm": letter, "operator": operator,
-                        "character": "expert" if operator < OPERATORS // 2 else "novice", "trial": trial,
-                        "order": (operator + list(ALGORITHMS).index(letter)) % 3, "finished": True,
-                        "stops": 2 if letter == "B" else 0, "peak_qdd_joint": int(qdd.max(axis=0).argmax()),
-                        "unexpected": 0, "drift_mm": 0.01, "drift_deg": 0.001, "unsolved": 0, **near,
-                    }  # fmt: skip
+                        "algorithm": letter,
+                        "operator": operator,
+                        "character": "expert" if operator < OPERATORS // 2 else "novice",
+                        "trial": trial,
+                        "order": (operator + list(ALGORITHMS).index(letter)) % 3,
+                        "finished": True,
+                        "stops": 2 if letter == "B" else 0,
+                        "peak_qdd_joint": int(qdd.max(axis=0).argmax()),
+                        "unexpected": 0,
+                        "drift_mm": 0.01,
+                        "drift_deg": 0.001,
+                        "unsolved": 0,
+                        **near,
+                    }
                 )
     return pl.DataFrame(rows, schema=TRIAL_COLUMNS)
 
