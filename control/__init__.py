@@ -1,6 +1,8 @@
 """Control: one cycle from any formulation and solver, paths, the closed loop, inverse kinematics, trajectories."""
 
 from ..formulations import BOUND_TOLERANCE, FIXED_TOLERANCE
+from .compiled_guiding import CompiledGuiding
+from .export_guiding import export_guiding
 from .guided_run import GuidedRun, Hand, simulate_guiding
 from .guiding import GuidingController
 from .guiding_result import GuidingPhase, GuidingResult
@@ -29,6 +31,7 @@ __all__ = [
     "AnyStep",
     "Character",
     "Command",
+    "CompiledGuiding",
     "CubicStopAndGo",
     "Guide",
     "GuidedRun",
@@ -51,6 +54,7 @@ __all__ = [
     "SpiralPath",
     "Step",
     "Trajectory",
+    "export_guiding",
     "inverse_kinematics",
     "make_guiding",
     "make_step",

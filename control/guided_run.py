@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..formulations import Mode
     from ..robots import Robot
     from ..solvers import Status
+    from .compiled_guiding import CompiledGuiding
     from .guiding import GuidingController
     from .guiding_result import GuidingPhase, GuidingResult
 
@@ -111,19 +112,19 @@ class GuidedRun:
 
 
 def simulate_guiding(
-    controller: GuidingController,
+    controller: GuidingController | CompiledGuiding,
     hand: Hand,
     q0: ArrayLike,
     duration: float,
     *,
-    schedule: Sequence[tuple[float, Callable[[GuidingController], object]]] = (),
+    schedule: Sequence[tuple[float, Callable[[Any], object]]] = (),
     on_tick: Callable[[int, int], None] | None = None,
 ) -> GuidedRun:
     """Run a controller with a hand on the tool; commands are integrated exactly over one period.
 
     Parameters
     ----------
-    controller : GuidingController
+    controller : GuidingController or CompiledGuiding
         From rest: it is reset first.
     hand : Hand
         Reset first, too.

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..formulations import DEFAULT_DT, InputError, Mode, check_input
 from ..solvers import Status
+from .checks import checked_array, checked_modes, checked_period
 from .guiding_result import GuidingPhase, GuidingResult
 from .guiding_settings import GuidingSettings
 from .guiding_unit import GuidingUnit
@@ -55,14 +56,10 @@ class GuidingController:
     def __init__(
         self, steps: Sequence[AnyStep], settings: GuidingSettings | None = None, dt: float = DEFAULT_DT
     ) -> None:
-        modes = [str(step.mode) for step in steps]
-        if not steps or len(set(modes)) < len(modes):
-            raise ValueError(f"modes: expected at least one, each once, got {', '.join(modes) or 'none'}")
-        if not (np.isfinite(dt) and dt > 0.0):
-            raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+        checked_modes([step.mode for step in steps])
         self.robot: Final = steps[0].robot
         self.settings: Final = settings or GuidingSettings()
-        self.dt: Final = float(dt)
+        self.dt: Final = checked_period(dt)
         self._units: Final = {str(step.mode): GuidingUnit(step, self.settings, self.dt) for step in steps}
         self._specs: Final[dict[str, Input]] = {}
         for unit in self._units.values():
@@ -116,7 +113,7 @@ class GuidingController:
         ValueError
             When it is none of `modes`.
         """
-        name = str(Mode.parse(mode) if isinstance(mode, str) else mode)
+        name = str(checked_modes([mode])[0])
         if name not in self._units:
             raise ValueError(f"mode: expected one of {', '.join(self._units)}, got {name!r}")
         self._wanted = self._units[name]
@@ -176,8 +173,8 @@ class GuidingController:
         InputError
             Naming the one that has the wrong shape or is not finite.
         """
-        position = _checked("q", q, self.robot.nv)
-        pull = _checked("wrench", wrench, 6)
+        position = checked_array("q", q, self.robot.nv)
+        pull = checked_array("wrench", wrench, 6)
         if self._anchor is None:
             self._anchor = self._unit.anchor_at(position)
         if self._phase is not GuidingPhase.GUIDING and not self._v.any():
@@ -225,15 +222,3 @@ class GuidingController:
         return GuidingResult(
             tick.qd, v, v_actual, tick.status, tick.iterations, tick.active, self.mode, self._phase, drift, yielded
         )
-
-
-def _checked(name: str, given: ArrayLike, size: int) -> Array:
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected {size} numbers, got {given!r}") from None
-    if values.shape != (size,):
-        raise InputError(f"{name}: expected shape ({size},), got {values.shape}")
-    if not np.isfinite(values).all():
-        raise InputError(f"{name}: expected finite numbers, got {values}")
-    return values

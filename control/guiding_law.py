@@ -44,6 +44,8 @@ class GuidingLaw:
         way to `qd_max`; `drift`, (2, 1): distance and angle of the locked rows from the anchor [m, rad].
     anchor : dict of str to ca.SX
         `anchor`, (12, 1): rotation and position at `q`, column by column.
+    guided : dict of str to ca.SX
+        `v`, (m_free, 1): velocity that `qd_prev` gives along the guided rows.
     brake : dict of str to ca.SX
         `qd`, (nv, 1): the fastest admissible braking from `qd_prev`.
     """
@@ -59,6 +61,7 @@ class GuidingLaw:
         self.law: Final = self._declare()
         self.anchor: Final = {"anchor": ca.vec(tick.pose[:3, :])}
         bounds = velocity_bounds("viable", tick.q, tick.q_min, tick.q_max, self._qd_limit, tick.qdd_max, tick.dt)
+        self.guided: Final = {"v": tick.J_free @ tick.qd_prev}
         self.brake: Final = {"qd": braking(tick.qd_prev, *bounds, tick.qdd_max, tick.dt)}
 
     @property

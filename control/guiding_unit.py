@@ -48,10 +48,10 @@ class GuidingUnit:
     def __init__(self, step: AnyStep, settings: GuidingSettings, dt: float) -> None:
         law = GuidingLaw(step.robot, step.mode, settings)
         self.mode: Final = step.mode
-        self._robot: Final = step.robot
         self._step: Final = step
         self._law: Final = BufferedFunction("law", law.symbols_of(law.law), law.law)
         self._anchor: Final = BufferedFunction("anchor", law.symbols_of(law.anchor), law.anchor)
+        self._guided: Final = BufferedFunction("guided", law.symbols_of(law.guided), law.guided)
         self._brake: Final = BufferedFunction("brake", law.symbols_of(law.brake), law.brake)
         self._values: Final = {given.name: given.default for given in law.settable if given.default is not None}
         for name, default in {**self._values, "dt": np.array([dt])}.items():
@@ -137,9 +137,10 @@ class GuidingUnit:
 
     def guided_velocity(self, q: Array, qd: Array) -> Array:
         """Velocity along the guided rows, shape (m_free,) [m/s, rad/s]."""
-        twist_map = self.mode.twist_map_at(self._robot.pose(q))[list(self.mode.free_rows)]
-        velocity: Array = twist_map @ (self._robot.jacobian(q) @ qd)
-        return velocity
+        self._guided.given["q"][:] = q
+        self._guided.given["qd_prev"][:] = qd
+        self._guided()
+        return self._guided.results["v"][:, 0].copy()
 
     def _put(self, name: str, values: Array) -> None:
         for function in (self._law, self._brake):

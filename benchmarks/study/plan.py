@@ -47,7 +47,7 @@ class Trial(NamedTuple):
 
 
 def study_settings(
-    *, operators: int = 42, trials: int = 3, seed: int = 2018, time_limit: float = 20.0, dt: float = DEFAULT_DT
+    *, operators: int = 42, trials: int = 3, seed: int = 2018, time_limit: float = 30.0, dt: float = DEFAULT_DT
 ) -> StudySettings:
     """Settings of the thesis's experiment (5.2): 42 subjects, three trials with each algorithm, the semicircle.
 

@@ -20,43 +20,24 @@ from kinqp.control import (
 from kinqp.formulations import InputError, Mode
 from kinqp.robots import load_robot
 from kinqp.solvers import PluginError, Status
+from tests.control.hands import Pull, constant, smooth
 
 ROBOT = load_robot("lbr_med14")
 START = np.deg2rad([-55.0, 65.0, 10.0, -90.0, -5.0, 30.0, 0.0])
 DT = 1e-3
 
 
-class Pull:
-    """A hand that pulls by a function of time, pose and twist."""
+def elbow_angle(q):
+    """Arm angle of the LBR by its joint centres [rad]; second opinion to the symbolic one."""
+    import pinocchio as pin
 
-    def __init__(self, function, until=np.inf):
-        self.function, self.until = function, until
-
-    def wrench(self, t, pose, twist):
-        """As in `Hand`."""
-        return np.asarray(self.function(t, pose, twist), dtype=float)
-
-    def finished(self, t):
-        """As in `Hand`."""
-        return t > self.until
-
-    def reset(self):
-        """As in `Hand`."""
-
-
-def constant(*wrench):
-    """A hand that always pulls alike."""
-    return Pull(lambda *_: wrench)
-
-
-def smooth(*wrench, rise=0.5):
-    """A hand whose pull grows smoothly from nothing."""
-
-    def pull(t, *_):
-        x = min(t / rise, 1.0)
-        return np.array(wrench) * x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-
-    return Pull(pull)
+    model, data = ROBOT.model, ROBOT.model.createData()
+    pin.forwardKinematics(model, data, ROBOT.to_pinocchio(q))
+    shoulder, elbow, wrist = (data.oMi[joint].translation for joint in (2, 4, 6))
+    line = (wrist - shoulder) / np.linalg.norm(wrist - shoulder)
+    up = np.array([0.0, 0.0, 1.0]) - line[2] * line
+    out = (elbow - shoulder) - line * (line @ (elbow - shoulder))
+    return np.arctan2(line @ np.cross(up, out), up @ out)
 
 
 def guiding(modes=("fix-orientation",), formulation="joint-space", **options):
@@ -300,6 +281,18 @@ class TestLimits:
         run = simulate_guiding(controller, smooth(5.0, 12.0, 8.0, 0, 0, 0), START, 1.5)
         assert (run.q <= limits + 1e-9).all()
         assert np.linalg.norm(run.twist[-1, :3]) > 0.05
+
+    def test_elbow_restriction_is_a_constraint_that_can_be_set(self):
+        # A torque about the tool's z turns the arm about its shoulder and wrist: the elbow goes along, unless held.
+        turned = {}
+        for formulation in ("joint-space", "joint-space + elbow-range"):
+            controller = guiding(["free"], formulation)
+            if "elbow" in formulation:
+                controller.set(elbow_range_width=1e-3, elbow_range_angle=elbow_angle(START))
+            run = simulate_guiding(controller, smooth(0, 13.0, 5.0, 0, 0, 1.0), START, 1.0)
+            turned[formulation] = abs(elbow_angle(run.q_end) - elbow_angle(START))
+        assert turned["joint-space"] > 0.02
+        assert turned["joint-space + elbow-range"] < 2e-3
 
 
 class TestStops:
