@@ -19,6 +19,7 @@ def run_study(
     operators: Annotated[int, typer.Option(min=1, help="How many simulated people.")] = 42,
     trials: Annotated[int, typer.Option(min=1, help="How often each tries each algorithm.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 2018,
+    dt: Annotated[float, typer.Option(help="Control period [s]; the hard stop's peak goes with its inverse.")] = 1e-3,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = 2,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the study in the folder.")] = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the study in the folder.")] = False,
@@ -33,7 +34,7 @@ def run_study(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=errors, transient=True,
     )  # fmt: skip
-    settings = study_settings(operators=operators, trials=trials, seed=seed)
+    settings = study_settings(operators=operators, trials=trials, seed=seed, dt=dt)
     try:
         with progress, interruptible() as interrupted:
             bar = progress.add_task("trials")
@@ -51,8 +52,10 @@ def run_study(
                 on_stage=on_stage,
             )  # fmt: skip
     except KeyboardInterrupt:
-        again = f"kinqp study --out {out} --operators {operators} --trials {trials} --seed {seed} --resume"
-        console.print(f"Interrupted; {out} keeps all trials done. Next: {again}", markup=False)
+        again = f"kinqp study --out {out} --operators {operators} --trials {trials} --seed {seed} --dt {dt:g}"
+        console.print(
+            f"Interrupted; {out} keeps all trials done. Next: {again} --workers {workers} --resume", markup=False
+        )
         raise typer.Exit(130) from None
     for verdict in written.findings.verdicts:
         console.print(f"{_MARKS[verdict.holds]}: {verdict.expected}: {verdict.measured}", markup=False)
