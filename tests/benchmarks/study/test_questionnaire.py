@@ -1,6 +1,7 @@
 """The thesis's chi-squared values from its tables, to the printed digits."""
 
 import math
+from pathlib import Path
 
 import pytest
 from scipy import stats
@@ -129,3 +130,24 @@ def test_completions_do_not_move_c(checks: QuestionnaireChecks) -> None:
     for row in checks.completion.reproducing[::7]:
         found = median_test({"A": answers(row), "C": answers(PRINTED["C"][2])})
         assert found.above == (7, 23)
+
+
+def test_the_document_says_what_comes_out(checks: QuestionnaireChecks) -> None:
+    page = (Path(__file__).parents[3] / "docs" / "study.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in page.splitlines()]
+    for one in checks.comparisons:
+        if one.printed is None:
+            assert f"{one.test.statistic:.2f}" in page, one
+            continue
+        (row,) = (row for row in rows if row and row[0].startswith(f"{one.question + 1}, "))
+        value = one.completed[0] if one.completed else one.test.statistic
+        assert row[1].startswith(f"{one.printed:.2f}, ")
+        assert row[2].startswith(f"{value:.2f}")
+        assert float(row[3].split()[0]) == pytest.approx(
+            one.completed_p[0] if one.completed_p else one.test.p_value, rel=0.02
+        )
+        assert f"{one.corrected:.2f}" in row[4]
+    for _, value in checks.completion.by_fives:
+        assert f"{value:.2f}" in page
+    low, high = next(one.completed for one in checks.comparisons if one.said is None)
+    assert f"from {low:.2f} to {high:.2f}" in page
