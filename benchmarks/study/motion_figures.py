@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _DEG: Final = 180.0 / np.pi
 # Stretches of a run of which the smallest and largest value are drawn.
 _BUCKETS: Final = 450
+# An algorithm with values so many times as large as all others would leave nothing to be seen of these.
+_DWARFING: Final = 3.0
 # Smallest acceleration on the logarithmic axis [rad/s^2]: below is rounding.
 _FLOOR: Final = 1e-6
 _COLUMN: Final = {"A": "A: task priority", "B": "B: saturation in the null space", "C": "C: QP"}
@@ -39,37 +41,55 @@ def column_title(letter: str, settings: StudySettings) -> str:
 
 def joint_figure(found: StudyResult, *, buckets: int = _BUCKETS) -> PanelFigure:
     """Position, velocity, acceleration and torque of all joints, a column for each algorithm."""
-    rows: list[tuple[str, Callable[[str, GuidedRun], Array]]] = [
-        ("position [°]", lambda _, run: _DEG * run.q),
-        ("velocity [rad/s]", lambda _, run: run.qd),
-        ("acceleration [rad/s²]", lambda _, run: run.acceleration()),
-        ("torque [Nm]", lambda letter, _: found.torques[letter]),
+    quantities: list[tuple[str, str, Callable[[str, GuidedRun], Array]]] = [
+        ("position", "°", lambda _, run: _DEG * run.q),
+        ("velocity", "rad/s", lambda _, run: run.qd),
+        ("acceleration", "rad/s²", lambda _, run: run.acceleration()),
+        ("torque", "Nm", lambda letter, _: found.torques[letter]),
     ]
-    panels = tuple(
-        tuple(
-            Panel(
-                column_title(letter, found.settings) if number == 0 else "",
-                "time [s]",
-                label,
-                tuple(
-                    thinned(f"joint {joint + 1}", run.t, column, COLOURS[joint % len(COLOURS)], buckets=buckets)
-                    for joint, column in enumerate(values(letter, run).T)
-                ),
+    rows, cuts = [], []
+    for number, (name, unit, of) in enumerate(quantities):
+        values = {letter: of(letter, run) for letter, run in found.runs.items()}
+        shown = _cut({letter: float(np.abs(one).max()) for letter, one in values.items()})
+        if shown is not None:
+            beyond = [
+                f"{one} reaches {np.abs(v).max():,.0f} {unit}" for one, v in values.items() if np.abs(v).max() > shown
+            ]
+            cuts.append(f"The axis of the {name} is cut: {', '.join(beyond)}.")
+        rows.append(
+            tuple(
+                Panel(
+                    column_title(letter, found.settings) if number == 0 else "",
+                    "time [s]",
+                    f"{name} [{unit}]",
+                    tuple(
+                        thinned(f"joint {joint + 1}", run.t, column, COLOURS[joint % len(COLOURS)], buckets=buckets)
+                        for joint, column in enumerate(values[letter].T)
+                    ),
+                    y_range=None if shown is None else (-shown, shown),
+                )
+                for letter, run in found.runs.items()
             )
-            for letter, run in found.runs.items()
         )
-        for number, (label, values) in enumerate(rows)
+    caption = (
+        "One trial of the same simulated operator with each algorithm. Accelerations are differences of the commands; "
+        "torques follow from them by inverse dynamics with published inertias of the KUKA iiwa 14, gravity included."
     )
     return PanelFigure(
         "joints",
         "All joints",
-        "One trial of the same simulated operator with each algorithm. Accelerations are differences of the commands; "
-        "torques follow from them by inverse dynamics, gravity included.",
-        panels,
+        " ".join([caption, *cuts]),
+        tuple(rows),
         share_y=True,
         share_x=True,
         row_height=230,
     )
+
+
+def _cut(largest: dict[str, float]) -> float | None:
+    """Where to cut an axis that one algorithm would have for itself, beside the others; None: nowhere."""
+    ordered = sorted(largest.values())
+    return 1.25 * ordered[-2] if len(ordered) > 1 and ordered[-1] > _DWARFING * ordered[-2] else None
 
 
 def elbow_figure(found: StudyResult, *, buckets: int = 2 * _BUCKETS) -> PanelFigure:

@@ -18,7 +18,7 @@ from .outcome_figures import outcome_figure, questionnaire_figure
 from .panels import ALGORITHM_COLOURS
 from .panels_plotly import to_plotly
 from .pattern import LEVEL
-from .tables import NOTHING
+from .words import NOTHING, count, number, two_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -90,7 +90,7 @@ def page(found: Findings, drawn: Mapping[str, tuple[PanelFigure, ...]]) -> str:
         medians=medians,
         test_heads=test_heads,
         tests=tests,
-        yates=[tables.number_2(one.corrected) for one in found.questionnaire.comparisons if one.printed is not None],
+        yates=[two_decimals(one.corrected) for one in found.questionnaire.comparisons if one.printed is not None],
         thesis_tests=tables.thesis_rows(found.questionnaire),
         thesis_notes=tables.thesis_notes(found.questionnaire),
         limitations=limitations(study),
@@ -126,11 +126,11 @@ def _chart(described: PanelFigure) -> dict[str, Any]:
 
 
 def _lead(settings: StudySettings) -> str:
-    count = " and ".join(f"{count} {name}s" for name, count in settings.counts.items() if count)
+    people = " and ".join(count(some, name) for name, some in settings.counts.items() if some)
     return (
-        f"{settings.operators} simulated operators ({count}), {settings.trials} trials each with every algorithm, in "
-        f"random order, on the {settings.robot}: the experiment of chapter 5 of A. Spinoglio's thesis, again, measured "
-        f"at every tick of {1e3 * settings.dt:g} ms."
+        f"{count(settings.operators, 'simulated operator')} ({people}), {count(settings.trials, 'trial')} each with "
+        f"every algorithm, in random order, on the {settings.robot}: the experiment of chapter 5 of A. Spinoglio's "
+        f"thesis, again, measured at every tick of {1e3 * settings.dt:g} ms."
     )
 
 
@@ -138,7 +138,7 @@ def _tiles(found: Findings) -> list[dict[str, str]]:
     by = {one.outcome.key: one.by for one in found.medians}
 
     def tile(letter: str, key: str, label: str, unit: str, kind: str = "") -> dict[str, str]:
-        value = tables.number(by[key][letter, "all"].value)
+        value = number(by[key][letter, "all"].value)
         return {"value": value, "label": f"{letter}: {label} [{unit}], median", "kind": kind}
 
     judged = [one.holds for one in found.verdicts if one.holds is not None]
@@ -171,7 +171,7 @@ def _facts(settings: StudySettings) -> list[tuple[str, str]]:
         ("path", f"semicircle, radius {settings.radius:g} m"),
         ("control period", f"{1e3 * settings.dt:g} ms"),
         ("seed", str(settings.seed)),
-        ("operators", ", ".join(f"{count} {name}" for name, count in settings.counts.items())),
+        ("operators", ", ".join(f"{some} {name}" for name, some in settings.counts.items())),
         ("trials", f"{settings.trials} for each operator and algorithm, ended after {settings.time_limit:g} s"),
         ("acceleration limits", ", ".join(f"{value:g}" for value in settings.qdd_max) + " rad/s²"),
     ]

@@ -91,6 +91,9 @@ class Boxes:
     slot: str
 
 
+# Decades on a logarithmic axis beyond which only these are marked.
+_WIDE: Final = 2.5
+
 Content = Line | Band | Bars | Boxes
 
 
@@ -148,13 +151,23 @@ class PanelFigure:
         return tuple(panel for row in self.rows for panel in row if panel is not None)
 
 
-def decades(panel: Panel) -> float:
-    """Decades that a panel's lines and boxes span, limits included."""
+def log_ticks(panel: Panel) -> Array | None:
+    """Values to be marked on a logarithmic axis, 1, 2 and 5 times the powers of ten; None: powers of ten will do."""
+    low, high = _span(panel)
+    if np.log10(high / low) > _WIDE:
+        return None
+    powers = np.arange(np.floor(np.log10(low)) - 1, np.ceil(np.log10(high)) + 1)
+    marks = np.multiply.outer(10.0**powers, [1.0, 2.0, 5.0]).ravel()
+    return np.asarray(marks[(marks >= 0.5 * low) & (marks <= 2.0 * high)])
+
+
+def _span(panel: Panel) -> tuple[float, float]:
+    """Smallest and largest positive value of a panel's lines and boxes; (1, 1) where there is none."""
     values = [one.y for one in panel.contents if isinstance(one, Line)]
     values += [some for one in panel.contents if isinstance(one, Boxes) for some in one.values]
     every = np.concatenate(values) if values else np.ones(1)
     positive = every[every > 0.0]
-    return float(np.log10(positive.max() / positive.min())) if positive.size else 0.0
+    return (float(positive.min()), float(positive.max())) if positive.size else (1.0, 1.0)
 
 
 def thinned(

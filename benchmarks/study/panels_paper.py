@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import NullLocator
 
 from ..report.paper.style import DASHES, figure
-from .panels import Band, Bars, Boxes, Line, decades
+from .panels import Band, Bars, Boxes, Line, log_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 _ROW: Final = 1.45
 # Of the places side by side in a category, how much bars and boxes fill.
 _FILL: Final = 0.8
-# Decades on a logarithmic axis below which it is marked between them, too.
-_NARROW: Final = 2.5
 
 
 def to_paper(described: PanelFigure) -> Figure:
@@ -81,9 +79,11 @@ def _draw(axis: Axes, panel: Panel) -> None:
         axis.grid(visible=False, axis="x")
     if panel.log_y:
         axis.set_yscale("log")
-        if decades(panel) < _NARROW:
-            axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axis.yaxis.set_major_formatter("{x:g}")
+        marks = log_ticks(panel)
+        if marks is not None:
+            low, high = axis.get_ylim()
+            marks = marks[(marks >= low) & (marks <= high)]
+            axis.set_yticks(marks, [f"{mark:g}" for mark in marks])
             axis.yaxis.set_minor_locator(NullLocator())
     if panel.y_range is not None:
         axis.set_ylim(*panel.y_range)

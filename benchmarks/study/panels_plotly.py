@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from .panels import Band, Bars, Boxes, Line, decades
+from .panels import Band, Bars, Boxes, Line, log_ticks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 _BACKGROUND: Final = "#ffffff"
 # What titles, legend and axis labels take beside the rows [px].
 _AROUND: Final = 120
-# Decades on a logarithmic axis beyond which only these are marked.
-_WIDE: Final = 2.5
 
 
 def to_plotly(figure: PanelFigure) -> Any:
@@ -71,8 +69,13 @@ def _fill(made: Any, panel: Panel, i: int, j: int, named: set[str]) -> None:
             made.add_trace(trace, row=i, col=j)
     axis: dict[str, Any] = {}
     if panel.log_y:
-        wide = decades(panel) > _WIDE
-        axis |= {"type": "log", "exponentformat": "power" if wide else "none", "dtick": 1 if wide else "D2"}
+        marks = log_ticks(panel)
+        axis["type"] = "log"
+        axis |= (
+            {"exponentformat": "power", "dtick": 1}
+            if marks is None
+            else {"tickvals": marks.tolist(), "ticktext": [f"{mark:g}" for mark in marks]}
+        )
     if panel.y_range is not None:
         axis["range"] = list(np.log10(panel.y_range)) if panel.log_y else list(panel.y_range)
     if axis:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .outcomes_table import characters_of, letters_of
 from .questionnaire import PRINTED_P_TEXT, PRINTED_PREFER_C, SUBJECTS
+from .words import NOTHING, number, p_value, two_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,28 +19,6 @@ if TYPE_CHECKING:
     from .outcomes_table import Medians, OutcomeTest
     from .questionnaire_checks import Comparison, QuestionnaireChecks
     from .result import StudyResult
-
-#: What stands where there is no number.
-NOTHING = "\N{EN DASH}"
-
-
-def number(value: float | None) -> str:
-    """Three digits, without an exponent where that reads better."""
-    if value is None:
-        return NOTHING
-    if value == round(value) and abs(value) < 1e3:
-        return f"{value:.0f}"
-    if abs(value) >= 1e5 or abs(value) < 1e-3:
-        return f"{value:.2e}"
-    digits = max(0, 2 - int(np.floor(np.log10(abs(value)))))
-    return f"{value:.{digits}f}"
-
-
-def p_value(value: float | None) -> str:
-    """A p-value in two digits."""
-    if value is None:
-        return NOTHING
-    return f"{value:.1e}" if value < 1e-3 else f"{value:.2g}"
 
 
 def median_rows(found: Sequence[Medians], trials: pl.DataFrame) -> tuple[list[str], list[dict[str, Any]]]:
@@ -105,19 +84,14 @@ def _thesis_row(one: Comparison) -> dict[str, str]:
     return {
         "pair": f"{one.pair[0]} and {one.pair[1]}",
         "question": str(one.question + 1),
-        "listed": number_2(one.test.statistic),
-        "completed": "" if one.completed is None else _range(*one.completed, number_2),
+        "listed": two_decimals(one.test.statistic),
+        "completed": "" if one.completed is None else _range(*one.completed, two_decimals),
         "p": p,
         "holm": p_value(one.holm),
         "printed": printed,
         "said": said,
         "kind": kind,
     }
-
-
-def number_2(value: float | None) -> str:
-    """Two decimals, as the thesis prints chi-squared."""
-    return NOTHING if value is None else f"{value:.2f}"
 
 
 def _range(low: float, high: float, text: Any) -> str:
@@ -134,8 +108,8 @@ def thesis_notes(checks: QuestionnaireChecks) -> list[str]:
     open_ = [one for one in checks.comparisons if one.printed is None and one.said is None]
     notes = [
         f"Question 3 of algorithm A lists {SUBJECTS - completion.missing} answers of {SUBJECTS}. As listed they give "
-        f"{number_2(short.test.statistic)}, not {number_2(short.printed)}. The printed value comes out when none of "
-        f"the {completion.missing} missing answers is a 5, whatever they are otherwise: in "
+        f"{two_decimals(short.test.statistic)}, not {two_decimals(short.printed)}. The printed value comes out when "
+        f"none of the {completion.missing} missing answers is a 5, whatever they are otherwise: in "
         f"{len(completion.reproducing)} of the {completion.tried} ways to complete the row. With a 5 among them it "
         f"would be less ({fives}).",
         "The printed p-values are columns of a table of critical values rather than p-values: chi-squared is "
@@ -144,13 +118,13 @@ def thesis_notes(checks: QuestionnaireChecks) -> list[str]:
     ]
     notes += [
         f"B is said to have more than 25 in every comparison; question {one.question + 1} of "
-        f"{one.pair[0]} and {one.pair[1]} has {number_2(one.test.statistic)}."
+        f"{one.pair[0]} and {one.pair[1]} has {two_decimals(one.test.statistic)}."
         for one in off
     ]
     notes += [
         f"For question {one.question + 1} of {one.pair[0]} and {one.pair[1]} it depends on the missing answers, which "
-        f"move the pooled median: {number_2(one.completed[0])} to {number_2(one.completed[1])}; "
-        f"{number_2(one.test.statistic)} with the answers listed."
+        f"move the pooled median: {two_decimals(one.completed[0])} to {two_decimals(one.completed[1])}; "
+        f"{two_decimals(one.test.statistic)} with the answers listed."
         for one in open_
         if one.completed is not None
     ]

@@ -8,7 +8,7 @@ from kinqp.benchmarks.study import StudyResult
 from kinqp.benchmarks.study.median_test import holm, median_test
 from kinqp.benchmarks.study.outcomes_table import OUTCOMES, medians, operator_medians, outcome_tests
 from kinqp.benchmarks.study.result import TRIAL_COLUMNS
-from kinqp.benchmarks.study.tables import number, p_value
+from kinqp.benchmarks.study.words import count, number, p_value
 
 NOTHING = "\N{EN DASH}"
 TRIALS = pl.DataFrame(
@@ -70,7 +70,7 @@ def test_outcomes_are_columns() -> None:
 @pytest.mark.parametrize(
     ("value", "text"),
     [(None, NOTHING), (0.0, "0"), (3.0, "3"), (0.0123456, "0.0123"), (12.345, "12.3"), (999.6, "1000"),
-     (1234.5, "1234"), (1.5e6, "1.50e+06"), (2e-5, "2.00e-05"), (-0.5, "-0.500")],
+     (1234.5, "1234"), (106823.0, "107,000"), (1.5e7, "1.50e+07"), (2e-5, "2.00e-05"), (-0.5, "-0.500")],
 )  # fmt: skip
 def test_numbers_have_three_digits(value: float | None, text: str) -> None:
     assert number(value) == text
@@ -79,3 +79,7 @@ def test_numbers_have_three_digits(value: float | None, text: str) -> None:
 @pytest.mark.parametrize(("value", "text"), [(None, NOTHING), (0.0474, "0.047"), (1.0, "1"), (2.69e-4, "2.7e-04")])
 def test_p_values_have_two(value: float | None, text: str) -> None:
     assert p_value(value) == text
+
+
+def test_one_is_singular() -> None:
+    assert (count(1, "trial"), count(0, "trial"), count(3, "trial")) == ("1 trial", "0 trials", "3 trials")
