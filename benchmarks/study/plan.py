@@ -16,7 +16,7 @@ from .outcomes import outcomes_of
 from .result import ALGORITHMS, StudyError, StudySettings
 
 if TYPE_CHECKING:
-    from ...control import GuidingController
+    from ...control import CompiledGuiding, GuidingController
 
 #: The thesis's subjects by their experience with hand-guided robots (table 5.1), and whom we take them for.
 EXPERIENCE: Final = {"never": 11, "<5 trials": 8, "<20 trials": 4, "regular": 19}
@@ -121,12 +121,12 @@ class Course:
     settings : StudySettings
     path : SemicirclePath
         As in the scenario `semicircle`.
-    controllers : dict of str to GuidingController
+    controllers : dict of str to GuidingController or CompiledGuiding
     """
 
     settings: StudySettings
     path: SemicirclePath
-    controllers: dict[str, GuidingController]
+    controllers: dict[str, GuidingController | CompiledGuiding]
 
     @staticmethod
     def of(settings: StudySettings) -> Course:

@@ -63,13 +63,13 @@ def test_the_hand_waits_for_a_frozen_tool(character):
 
 @BOTH
 def test_the_hand_waits_for_a_slow_tool(character):
-    """In oil ten times as thick the aim does not run away, and the tool arrives all the same."""
+    """In oil four times as thick the aim does not run away, and the tool arrives all the same."""
     operator = Operator(PATH, character, seed=1)
-    run = guide(operator, PATH.start, lambda _x, v: 0.1 * v, 120.0)
+    run = guide(operator, PATH.start, lambda _x, v: 0.25 * v, 60.0)
     assert operator.finished(run["t"][-1])
     ahead = np.linalg.norm(run["aim"] - run["position"], axis=1)
     assert ahead.max() < character.lead + character.speed * character.reaction_time
-    assert run["t"][-1] > 2.0 * PATH.length / character.speed
+    assert run["t"][-1] > 1.5 * PATH.length / character.speed
 
 
 @BOTH
@@ -118,11 +118,13 @@ def test_a_novice_loses_more_time_at_stops():
 def test_who_does_not_know_the_side_tries_others():
     """Without a stance the order of sides is drawn; whatever it is, the tool gets around in the end."""
     firsts = set()
-    for seed in range(8):
+    for seed in range(4):
         operator = Operator(PATH, EXPERT, seed=seed)
         run = guide(operator, PATH.start, freezing(LIMIT), 60.0)
         assert operator.finished(run["t"][-1])
-        firsts.add(operator.stops)
+        back = np.flatnonzero(run["doing"] == Doing.BACKING_OFF)
+        went = run["aim"][back[np.flatnonzero(np.diff(back, append=-1) != 1)[0]]] - run["position"][back[0]]
+        firsts.add(tuple(np.round(went, 2)))
     assert len(firsts) > 1
 
 
@@ -136,8 +138,8 @@ def test_the_same_seed_is_the_same_person(character):
 
 def test_reset_begins_again():
     operator = Operator(PATH, NOVICE, seed=3, stance=DOWN)
-    first = guide(operator, PATH.start, freezing(LIMIT), 6.0)
-    again = guide(operator, PATH.start, freezing(LIMIT), 6.0)
+    first = guide(operator, PATH.start, freezing(LIMIT), 4.0)
+    again = guide(operator, PATH.start, freezing(LIMIT), 4.0)
     np.testing.assert_array_equal(first["wrench"], again["wrench"])
 
 
