@@ -27,6 +27,7 @@ from ..benchmarks import (
     sweep_table,
 )
 from ..benchmarks.certify import SliceError
+from ..benchmarks.study import StudyError
 from ..benchmarks.worst_case import CaseError
 from ..codegen import CurvatureError, ExportError, export_c
 from ..control import export_guiding
@@ -39,6 +40,7 @@ from .certify import run_certify
 from .davinci import run_davinci
 from .interrupt import interruptible
 from .report import run_compare, run_report
+from .study import run_study
 from .worst_case import run_worst_case
 
 if TYPE_CHECKING:
@@ -62,6 +64,7 @@ USER_ERRORS = (
     RobotError,
     SliceError,
     StoreError,
+    StudyError,
     UnknownOptionError,
     OSError,
 )
@@ -78,6 +81,7 @@ app = typer.Typer(
 app.command("report")(run_report)
 app.command("compare")(run_compare)
 app.command("davinci")(run_davinci)
+app.command("study")(run_study)
 app.command("worst-case")(run_worst_case)
 app.command("certify")(run_certify)
 
