@@ -9,7 +9,7 @@ import casadi as ca
 
 from .algebra import matmul
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, smoothing_time
+from .rate import kept_share, limit_rate, needed_slacks, rate_window, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -76,9 +76,9 @@ class CartesianErrorRobust(Formulation):
         rest = calm - matmul(inverse, speed)
         qd = tick.qd_fixed + matmul(inverse, speed + eps) + outside * rest
 
-        window = rate_window(tick, tau)
+        window = rate_window(tick, tau, jerk=True)
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")
         limit_rate(qp, tick, qd, window)
         qp.command(qd)
-        start = {"eps": -speed, "outside share": ca.SX(0), EXCESS: needed_excess(window, tick.qd_fixed)}
+        start = {"eps": -speed, "outside share": ca.SX(0)} | needed_slacks(window, tick.qd_fixed)
         qp.feasible(**start)

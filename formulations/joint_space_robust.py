@@ -9,7 +9,7 @@ import casadi as ca
 
 from ..solvers.options import flag
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, scaled_last_command, smoothing_time
+from .rate import kept_share, limit_rate, needed_slacks, rate_window, scaled_last_command, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Ten times that of `joint-space`: with less, a joint that runs into its limit at speed sets the self-motion swinging
 # (docs/singularities.md). It takes 1 % off the hand's speed where singular values are 0.3, 0.4 % at 0.5.
 ROBUST_JOINT_WEIGHT: Final = 1e-3
-_PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor")
+_PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor", "jerk")
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,7 @@ class JointSpaceRobust(Formulation):
     rate_limit: bool = True
     smoothing: bool = True
     governor: bool = True
+    jerk: bool = True
 
     name: ClassVar[str] = "joint-space-robust"
 
@@ -122,8 +123,8 @@ class JointSpaceRobust(Formulation):
         qp.command(qd)
         start = {"qd": tick.qd_fixed}
         if self.rate_limit:
-            window = rate_window(tick, tau)
+            window = rate_window(tick, tau, jerk=self.jerk)
             limit_rate(qp, tick, qd, window)
             start["qd"] = tick.qd_fixed + scaled_last_command(tick)
-            start[EXCESS] = needed_excess(window, start["qd"])
+            start |= needed_slacks(window, start["qd"])
         qp.feasible(eps=tick.J_free @ start["qd"] - tick.v, **start)
