@@ -16,15 +16,19 @@ if TYPE_CHECKING:
 
 # Joints slow down for a limit with this share of `qdd_max`, so that the exact braking curve is not met but followed.
 GENTLE: Final = 0.8
-# The slack's curvature is chosen such that its shift is 3 at the default price: all lengths in the whitened QP stay
-# near one, which is what a solver's tolerances are relative to.
+# The slacks' curvature is chosen such that the shift is 3 at a price of one: all lengths in the whitened QP stay
+# not far from one, which is what a solver's tolerances are relative to.
 _SHIFT: Final = 3.0
 EXCESS: Final = "excess"
 HASTE: Final = "haste"
+# A hundred to one: with ten to one accelerations still passed their limit by 1 % for comfort's sake.
+EXCESS_PRICE: Final = 10.0
 HASTE_PRICE: Final = 0.1
-# From nothing to `qdd_max`: a sign change takes the acceleration by less than 2 % of the limit past zero in a tick.
+# At this rate an acceleration changes by 1.7 % of its limit in a tick of 1 ms: less than the 2 % between 1 % on either
+# side of zero, where a change of sign begins to count.
 JERK_TIME: Final = 0.06
-LIMIT_TIME: Final = 0.06
+# With it a joint's braking for its limit takes half of that jerk, and leaves something to others.
+LIMIT_TIME: Final = 0.1
 # Accelerations from here on say that none is known.
 _UNKNOWN: Final = 1e100
 
@@ -139,7 +143,7 @@ def limit_rate(qp: QuadraticProgram, tick: Tick, qd: ca.SX, window: RateWindow) 
     qd : ca.SX, shape (nv, 1)
         The command, affine in the variables.
     """
-    price = tick.parameter("excess_price", 1.0, lowest=0.0, positive=True, unit="m^2/s^2")
+    price = tick.parameter("excess_price", EXCESS_PRICE, lowest=0.0, positive=True, unit="m^2/s^2")
     cheaper = tick.parameter("haste_price", HASTE_PRICE, lowest=0.0, positive=True, unit="m^2/s^2")
     excess, haste = qp.variable(EXCESS, 1), qp.variable(HASTE, 1)
     qp.minimize(excess / _SHIFT + _SHIFT * price, name="excess acceleration")
