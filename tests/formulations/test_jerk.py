@@ -47,8 +47,11 @@ def test_where_the_last_acceleration_is_unknown_only_the_acceleration_is_bounded
 
 @pytest.mark.parametrize("name", ["joint-space-robust", "cartesian-error-robust"])
 def test_comfort_yields_before_the_acceleration_limit(name: str) -> None:
-    """Against linear programs: least excess first, whatever haste it takes; and haste where the window alone is met."""
-    robot, hasty, over = arm("lbr_med14"), 0, 0
+    """Against linear programs: the least excess, whatever haste it takes.
+
+    Haste at a hundredth of the price is not quite nothing: one state in fifty may exceed the least, by half a percent.
+    """
+    robot, hasty, over, above = arm("lbr_med14"), 0, 0, 0
     for mode in ("fix-orientation", "rcm:-0.12"):
         rng = np.random.default_rng(1)
         evaluate = evaluator("lbr_med14", name, mode)
@@ -74,9 +77,11 @@ def test_comfort_yields_before_the_acceleration_limit(name: str) -> None:
             )  # fmt: skip
             assert least.status == 0
             excess, haste = solution.x[columns]
-            assert excess == pytest.approx(least.fun, abs=1e-6 * (1.0 + least.fun))
+            assert -1e-6 * (1.0 + least.fun) < excess - least.fun < 5e-3
+            above += excess - least.fun > 1e-6 * (1.0 + least.fun)
             over += excess > 1e-6
             hasty += haste > 1e-6 and excess < 1e-9
+    assert above <= 2
     assert hasty > 3
     assert over > 3
 
