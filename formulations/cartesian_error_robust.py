@@ -9,7 +9,7 @@ import casadi as ca
 
 from .algebra import matmul
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, smoothing_time
+from .rate import continued, kept_share, limit_rate, needed_slacks, rate_window, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -47,8 +47,8 @@ class CartesianErrorRobust(Formulation):
     -------------------
     task_weight : shape (m_free,)
         W's diagonal, 1 unless told otherwise.
-    damping_threshold, damping_max, pull_gain, smoothing_time, smoothing_stretch, excess_price,
-    governor_share
+    qdd_prev, damping_threshold, damping_max, pull_gain, smoothing_time, smoothing_stretch, jerk_time, limit_time,
+    excess_price, haste_price, governor_share
         As in `JointSpaceRobust`.
     """
 
@@ -60,7 +60,9 @@ class CartesianErrorRobust(Formulation):
         outside = qp.variable("outside share", 1)
         weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
         qp.minimize(eps, weight=weight, name="Cartesian error")
+        onward = qp.variable("onward share", 1)
         qp.minimize(outside - 1, weight=OUTSIDE_WEIGHT, name="motion outside the inverse's range")
+        qp.minimize(onward, weight=OUTSIDE_WEIGHT, name="going on as before")
 
         measured = damping(tick)
         inverse = matmul(tick.J_bar.T, measured.inverse)
@@ -74,11 +76,13 @@ class CartesianErrorRobust(Formulation):
         calm = keep * last + (1 - keep) * wanted
         speed = matmul(tick.J_free, calm)
         rest = calm - matmul(inverse, speed)
-        qd = tick.qd_fixed + matmul(inverse, speed + eps) + outside * rest
+        further = tick.fixed.project(continued(tick).T).T if tick.m_fixed else continued(tick)
+        further = further - matmul(inverse, matmul(tick.J_free, further))
+        qd = tick.qd_fixed + matmul(inverse, speed + eps) + outside * rest + onward * further
 
-        window = rate_window(tick, tau)
+        window = rate_window(tick, tau, jerk=True)
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")
         limit_rate(qp, tick, qd, window)
         qp.command(qd)
-        start = {"eps": -speed, "outside share": ca.SX(0), EXCESS: needed_excess(window, tick.qd_fixed)}
-        qp.feasible(**start)
+        start = {"eps": -speed, "outside share": ca.SX(0), "onward share": ca.SX(0)}
+        qp.feasible(**start, **needed_slacks(window, tick.qd_fixed))

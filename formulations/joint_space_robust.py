@@ -9,7 +9,7 @@ import casadi as ca
 
 from ..solvers.options import flag
 from .base import Formulation
-from .rate import EXCESS, kept_share, limit_rate, needed_excess, rate_window, scaled_last_command, smoothing_time
+from .rate import kept_share, limit_rate, needed_slacks, rate_window, scaled_last_command, smoothing_time
 from .singularity import damping, governor, pull
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Ten times that of `joint-space`: with less, a joint that runs into its limit at speed sets the self-motion swinging
 # (docs/singularities.md). It takes 1 % off the hand's speed where singular values are 0.3, 0.4 % at 0.5.
 ROBUST_JOINT_WEIGHT: Final = 1e-3
-_PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor")
+_PARTS: Final = ("damping", "pull", "rate_limit", "smoothing", "governor", "jerk")
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,10 @@ class JointSpaceRobust(Formulation):
       singular value in proportion to the hand's pull along the singular direction (`pull`). Damped alone, a stretched
       arm sticks.
     - **Rate limit**: accelerations stay within `qdd_max`. Where the locked rows or the limits of position and velocity
-      don't allow that, it yields, by the variable `excess` (`limit_rate`); those never do.
+      don't allow that, it yields, by the variable `excess`, s above (`limit_rate`); those never do.
+    - **Jerk limit**: accelerations change by `qdd_max` within `jerk_time`, no faster, as long as the last one is given
+      as `qdd_prev`. It and the gentle approach to limits that comes with smoothing yield first, by the variable
+      `haste`, which costs less than `excess` (`rate_window`).
     - **Smoothing**: the error of the last command, :math:`\varepsilon_{prev} = J_{free}\,\dot q_{prev} - v`, decays
       with a time constant instead of at once, :math:`\varphi = \tau/(\tau + dt)`, the longer the more acceleration
       the hand's speed needs (`smoothing_time`). The
@@ -51,12 +54,12 @@ class JointSpaceRobust(Formulation):
       leave the joints enough acceleration (`governor`): v stands for its governed share throughout.
 
     Zero motion, with :math:`\dot q` that of the drift correction, is feasible at every state within the limits. Each of
-    the five can be left out; without all of them this is `joint-space`. docs/singularities.md compares them.
+    the six can be left out; without all of them this is `joint-space`. docs/singularities.md compares them.
 
     Parameters
     ----------
-    damping, pull, rate_limit, smoothing, governor : bool
-        Which of the five to use; the pull needs the damping.
+    damping, pull, rate_limit, smoothing, governor, jerk : bool
+        Which of the six to use; the pull needs the damping, the jerk limit the rate limit.
 
     Run-time parameters
     -------------------
@@ -70,8 +73,13 @@ class JointSpaceRobust(Formulation):
         Speed of the pull over the hand's speed [1/m], 2.
     smoothing_time, smoothing_stretch
         tau at rest, and what the need of all of `qdd_max` adds to it (with the governor only) [s], 0.02 and 0.05.
-    excess_price
-        p [m^2/s^2], 1.
+    qdd_prev : shape (nv,)
+        Last accelerations, (qd_prev - the command before) / dt [rad/s^2 or m/s^2]; infinite, unknown, unless told
+        otherwise: then jerk is not limited.
+    jerk_time, limit_time
+        From no acceleration to `qdd_max`; least time constant with which limits are approached [s], 0.06 and 0.1.
+    excess_price, haste_price
+        p, and what haste costs in its place [m^2/s^2], 10 and 0.1.
     governor_share
         Largest share of `qdd_max` that the locked rows may take up [-], 0.3.
     """
@@ -81,16 +89,19 @@ class JointSpaceRobust(Formulation):
     rate_limit: bool = True
     smoothing: bool = True
     governor: bool = True
+    jerk: bool = True
 
     name: ClassVar[str] = "joint-space-robust"
 
     def __post_init__(self) -> None:
-        """Read options that came as words; refuse a pull without damping."""
+        """Read options that came as words; refuse a pull without damping, a jerk limit without a rate limit."""
         super().__post_init__()
         for option in _PARTS:
             object.__setattr__(self, option, flag(option, getattr(self, option)))
         if self.pull and not self.damping:
             raise ValueError("pull: expected damping, which the pull takes the place of, got damping=False")
+        if self.jerk and not self.rate_limit:
+            raise ValueError("jerk: expected rate_limit, whose window it narrows, got rate_limit=False")
 
     def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
         """State the problem of one control cycle."""
@@ -122,8 +133,8 @@ class JointSpaceRobust(Formulation):
         qp.command(qd)
         start = {"qd": tick.qd_fixed}
         if self.rate_limit:
-            window = rate_window(tick, tau)
+            window = rate_window(tick, tau, jerk=self.jerk)
             limit_rate(qp, tick, qd, window)
             start["qd"] = tick.qd_fixed + scaled_last_command(tick)
-            start[EXCESS] = needed_excess(window, start["qd"])
+            start |= needed_slacks(window, start["qd"])
         qp.feasible(eps=tick.J_free @ start["qd"] - tick.v, **start)

@@ -33,6 +33,7 @@ _LATEX: Final = {
     "qd_max": r"\dot q_{\mathrm{max}}",
     "qdd_max": r"\ddot q_{\mathrm{max}}",
     "qd_prev": r"\dot q_{\mathrm{prev}}",
+    "qdd_prev": r"\ddot q_{\mathrm{prev}}",
     "qd_fixed": r"\dot q_{\mathrm{fixed}}",
     "Jdot_qd": r"\dot J \dot q",
 }

@@ -176,6 +176,11 @@ class Tick:
         return self.parameter("qd_prev", None, size=self.nv, unit="rad/s or m/s")
 
     @property
+    def qdd_prev(self) -> ca.SX:
+        """Joint accelerations of the tick before, infinite where unknown, shape (nv, 1) [rad/s^2 or m/s^2]."""
+        return self.parameter("qdd_prev", np.inf, size=self.nv, may_be_infinite=True, unit="rad/s^2 or m/s^2")
+
+    @property
     def v(self) -> ca.SX:
         """Velocity that the hand asks for, shape (m_free, 1) [m/s, rad/s]."""
         return self.parameter("v", None, size=self.m_free, unit="m/s, rad/s")

@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinqp.benchmarks.scenarios.disturbances import DISTURBANCES, Disturbance
 from kinqp.benchmarks.scenarios.random_paths import random_paths
 from kinqp.benchmarks.scenarios.singular import SingularPath, hard_paths, singular_paths
 from kinqp.benchmarks.singular import (
-    DISTURBANCES,
     VARIANTS,
-    Disturbance,
     SingularRow,
     sign_changes,
     singular_run,

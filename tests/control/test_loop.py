@@ -109,6 +109,25 @@ class Counting(Formulation):
         qp.command(qd)
 
 
+@dataclass(frozen=True)
+class Recalling(Formulation):
+    """The last acceleration, given back as a velocity, and a millimetre or milliradian per second more."""
+
+    name: ClassVar[str] = "recalling"
+
+    def declare(self, qp: QuadraticProgram, tick: Tick) -> None:
+        qd = qp.variable("qd", tick.nv)
+        qp.minimize(qd - (1e-3 * tick.qdd_prev + 1e-3))
+        qp.command(qd)
+
+
+def test_a_step_that_remembers_accelerations_gets_the_last_one() -> None:
+    """At rest before: 1, then 1 + 1, then 1 + (2 - 1), then 1 + (2 - 2) millimetres per second."""
+    step = make_step(load_robot("lbr_med14"), Recalling(), "free")
+    run = simulate(step, Still(), np.zeros(7), 0.004)
+    np.testing.assert_allclose(run.qd, np.outer(1e-3 * np.array([1, 2, 2, 1]), np.ones(7)), atol=1e-15)
+
+
 def test_a_step_that_remembers_gets_the_last_command() -> None:
     step = make_step(load_robot("lbr_med14"), Counting(), "free")
     run = simulate(step, Still(), np.zeros(7), 0.005)

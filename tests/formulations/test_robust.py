@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 ROBUST = ("joint-space-robust", "cartesian-error-robust")
-NOTHING = "damping=false, pull=false, rate_limit=false, smoothing=false, governor=false"
+NOTHING = "damping=false, pull=false, rate_limit=false, smoothing=false, governor=false, jerk=false"
 STRETCHED = np.deg2rad([10.0, 40.0, 5.0, 0.0, -5.0, 40.0, 0.0])
 
 
@@ -194,7 +194,7 @@ def test_without_its_parts_it_is_joint_space(mode: str) -> None:
 
 def test_away_from_all_limits_it_is_a_low_pass_of_joint_space() -> None:
     """The QP with smoothing alone: the command is the weighted mean of the last one and the plain one."""
-    only = "joint-space-robust(damping=false, pull=false, rate_limit=false, governor=false)"
+    only = "joint-space-robust(damping=false, pull=false, rate_limit=false, governor=false, jerk=false)"
     smooth, plain = (
         evaluator("lbr_med14", only, "fix-orientation"),
         evaluator("lbr_med14", "joint-space", "fix-orientation"),
