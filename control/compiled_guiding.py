@@ -102,7 +102,7 @@ class CompiledGuiding:
         inputs = {given.name: given for mode in code.modes for given in mode.inputs} | {
             given.name: given for given in law.settable
         }
-        of_step = {field.name for field in code.parameters} - {"dt"}
+        of_step = {field.name for field in code.parameters} - {"dt", "qdd_prev"}
         found = {}
         for name, given in inputs.items():
             owner = self._parameters.step if name in of_step else self._parameters

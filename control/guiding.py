@@ -97,6 +97,7 @@ class GuidingController:
         self._failures = 0
         self._stop_asked = False
         self._qd: Array = np.zeros(self.robot.nv)
+        self._qdd: Array = np.zeros(self.robot.nv)
         self._limit: Array = self._target.copy()
         self._unit = next(iter(self._units.values()))
         self._wanted: GuidingUnit | None = None
@@ -203,18 +204,18 @@ class GuidingController:
         stopping = self._phase is GuidingPhase.STOPPING
         asked = self._unit.ask(position, pull, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
         self._limit = asked.qd_limit
-        tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._qd)
+        tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._qd, self._qdd)
         # Limits that leave no way back to the anchor must not keep the hand from moving.
         yielded = tick.status is not Status.SOLVED and bool(asked.v_fixed.any())
         if yielded:
-            tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._qd)
+            tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._qd, self._qdd)
         self._v = asked.v
         self._failures = 0 if tick.status is Status.SOLVED else self._failures + 1
         if self._failures:
             self._v = np.zeros_like(asked.v)
         if self._failures == self.settings.max_failures:
             self.stop(f"{self._failures} ticks in a row were not solved, the last one: {tick.status.value}")
-        self._qd = tick.qd
+        self._remember(tick.qd)
         return self._result(asked.v, asked.v + tick.eps, tick, asked.drift, yielded=yielded)
 
     def _come_to_rest(self, q: Array, pull: Array) -> GuidingResult:
@@ -222,7 +223,7 @@ class GuidingController:
         assert self._anchor is not None, "anchored at the first tick"  # noqa: S101  # for mypy
         asked = self._unit.ask(q, pull, self._v, self._anchor, self._qd, self._limit, stopping=True)
         self._limit = asked.qd_limit
-        self._qd = self._unit.brake(q, self._qd, self._limit)
+        self._remember(self._unit.brake(q, self._qd, self._limit))
         done = self._unit
         if not self._qd.any():
             if self._stop_asked:
@@ -238,6 +239,10 @@ class GuidingController:
         return GuidingResult(
             self._qd, zero, actual, Status.SOLVED, 0, (), done.mode, self._phase, asked.drift, yielded=False
         )
+
+    def _remember(self, qd: Array) -> None:
+        self._qdd = (qd - self._qd) / self.dt
+        self._qd = qd
 
     def _result(self, v: Array, v_actual: Array, tick: Command, drift: Array, *, yielded: bool) -> GuidingResult:
         return GuidingResult(

@@ -97,6 +97,7 @@ def render_guiding(
         "dt": None if dt is None else number(dt),
         "drift": any(field.name == "v_fixed" for field in code.inputs),
         "previous": any(field.name == "qd_prev" for field in code.inputs),
+        "change": "qdd_prev" in own,
         "anchor": _statements(laws[0], laws[0].anchor, sources | {"q": "q"}),
         "brake": _statements(laws[0], laws[0].brake, sources | {"q": "q"}),
         "modes": [

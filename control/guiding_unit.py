@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 # Given to a step by the controller, tick by tick.
-_GIVEN: Final = ("q", "v", "v_fixed", "qd_prev", "dt")
+_GIVEN: Final = ("q", "v", "v_fixed", "qd_prev", "qdd_prev", "dt")
 
 
 class Asked(NamedTuple):
@@ -57,6 +57,7 @@ class GuidingUnit:
         for name, default in {**self._values, "dt": np.array([dt])}.items():
             self._put(name, default)
         self._remembers: Final = "qd_prev" in step.inputs
+        self._remembers_change: Final = "qdd_prev" in step.inputs
         self._specs: Final = {spec.name: spec for spec in (*law.settable, *step.specs) if spec.name not in _GIVEN}
         # What differs from the step's own defaults; looking at inputs takes longer than a compiled tick.
         self._own: Final = {spec.name: spec.default for spec in step.specs}
@@ -117,7 +118,9 @@ class GuidingUnit:
         results = self._law.results
         return Asked(*(results[name][:, 0].copy() for name in Asked._fields))
 
-    def step_at(self, q: Array, v: Array, v_fixed: Array | None, qd_limit: Array, qd_prev: Array) -> Command:
+    def step_at(
+        self, q: Array, v: Array, v_fixed: Array | None, qd_limit: Array, qd_prev: Array, qdd_prev: Array
+    ) -> Command:
         """Compute the command; without `v_fixed` the locked rows stay where they are."""
         inputs = dict(self._extra)
         if v_fixed is not None and v_fixed.any():
@@ -126,6 +129,8 @@ class GuidingUnit:
             inputs["qd_max"] = qd_limit
         if self._remembers:
             inputs["qd_prev"] = qd_prev
+        if self._remembers_change:
+            inputs["qdd_prev"] = qdd_prev
         return self._step(q, v, **inputs)
 
     def brake(self, q: Array, qd_prev: Array, qd_limit: Array) -> Array:

@@ -37,8 +37,8 @@ class Command(Protocol):
         """SOLVED, or why the command is the safe stop."""
 
     @property
-    def iterations(self) -> int:
-        """As the solver counts them."""
+    def iterations(self) -> int | None:
+        """As the solver counts them; None where it does not."""
 
     @property
     def active(self) -> tuple[str, ...]:
