@@ -128,7 +128,7 @@ def _print(console: Console, result: Certificates) -> None:
         "without ties",
         "compiled",
         "regions",
-        "s",
+        "cpu s",
         "ticks run",
         "differ",
         "tolerated",

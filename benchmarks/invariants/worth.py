@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 TOLERANCE: Final = 1e-9
 # The x of a command is looked for until command and equalities are met to this share of the tolerance.
 _MET: Final = 0.1
+# ... or, where they can't be, to this multiple of the least error.
+_NEARLY: Final = 1.5
 
 
 def judge_worth(
@@ -62,6 +64,7 @@ def judge_worth(
         if result.status is Status.SOLVED:
             each = [worth(instance, solution.x, compiled[0][i]) for instance, solution in step.solved]
             rows[i], costs[i] = np.max(each, axis=0)
+    row.notes["parity or apart broken"] = int(np.sum(apart))
     row.notes["parity or apart broken, and worth as much"] = int(np.sum(apart & (np.maximum(rows, costs) <= TOLERANCE)))
     row.check("compiled rows", rows, TOLERANCE, states)
     row.check("compiled cost", costs, TOLERANCE, states)
@@ -109,19 +112,17 @@ def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:
 def _least(matrix: Array, wanted: Array, enough: float) -> tuple[Array, Array]:
     """Solve matrix x = wanted by as few singular directions, the largest first, as meet it to what is enough.
 
-    In the others x would be rounding of the command, divided by a singular value of next to nothing. Also gives the
-    directions that change nothing, as columns.
+    In the others x would be rounding of the command, divided by a singular value of next to nothing. Where none are
+    enough it is met about as well as it can be. Also gives the directions that change nothing, as columns.
     """
     left, sigma, right = np.linalg.svd(matrix)
     rank = int(np.sum(sigma > 10.0 * np.finfo(float).eps * sigma[0]))
-    x, rest = np.zeros(matrix.shape[1]), wanted
-    for k in range(rank):
-        if float(np.abs(rest).max()) <= enough:
-            break
-        along = float(left[:, k] @ rest)
-        x = x + along / sigma[k] * right[k]
-        rest = rest - along * left[:, k]
-    return x, right[rank:].T
+    along = left[:, :rank].T @ wanted
+    # What is left of `wanted` after 0, 1, ... directions.
+    rest = wanted - np.vstack([np.zeros(wanted.size), np.cumsum(along[:, None] * left[:, :rank].T, axis=0)])
+    off = np.abs(rest).max(axis=1)
+    used = int(np.argmax(off <= max(enough, _NEARLY * float(off.min()))))
+    return (along[:used] / sigma[:used]) @ right[:used], right[rank:].T
 
 
 def _best_left(qp: QP, x: Array, left: Array, unit: float) -> Array:
