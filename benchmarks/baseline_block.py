@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..baselines import Situation
     from ..formulations import StepResult
+    from .begun import Progress
     from .cells import Block, Cell
     from .config import SweepConfig
     from .loop import State
@@ -84,18 +85,24 @@ class TimedBaseline:
     situations : Situations
         The block's.
     config : SweepConfig
+    begun : Progress, optional
+        What an earlier process came to.
     """
 
-    def __init__(self, cell: Cell, situations: Situations, config: SweepConfig) -> None:
+    def __init__(self, cell: Cell, situations: Situations, config: SweepConfig, begun: Progress | None = None) -> None:
         steps = _Steps(cell.block)
         self._baseline: Final = get_baseline(cell.formulation)
         self._situations: Final = {tick: steps.observe(state) for tick, state in situations.states.items()}
-        self._windows: Final = affordable(
-            situations.windows,
-            config.timing_budget / config.repeats,
-            lambda window: self._window(window, no_rows(), []),
+        self._windows: Final = (
+            begun.windows
+            if begun
+            else affordable(
+                situations.windows,
+                config.timing_budget / config.repeats,
+                lambda window: self._window(window, no_rows(), []),
+            )
         )
-        self._visits: Final = Visits()
+        self.visits: Final = Visits(begun)
 
     def visit(self, repeat: int) -> None:
         """Resolve all situations once, and keep the times."""
@@ -103,11 +110,15 @@ class TimedBaseline:
         answers: list[Array] = []
         for window in self._windows:
             self._window(window, rows, answers)
-        self._visits.add(repeat, rows, answers)
+        self.visits.add(repeat, rows, answers)
 
     def result(self) -> tuple[pl.DataFrame, Part]:
         """All times, in the columns of `TimedCell.result`: an update of zero, and no set-up; and how the cell ended."""
-        return self._visits.result(sum(len(window.ticks) for window in self._windows), _NOTES)
+        return self.visits.result(sum(len(window.ticks) for window in self._windows), _NOTES)
+
+    def progress(self) -> Progress:
+        """How far it has come."""
+        return self.visits.progress(self._windows)
 
     def _window(self, window: Window, rows: dict[str, list[float | int | None]], answers: list[Array]) -> None:
         for tick in (window.lead, *window.ticks):

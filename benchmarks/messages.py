@@ -29,12 +29,20 @@ class Run:
 
 @dataclass(frozen=True)
 class Time:
-    """Time cells of a block; answered by any number of `Visiting` and `Ran`, then None."""
+    """Time cells of a block; answered by any number of `Visiting`, `Begun` and `Ran`, then None."""
 
     problems: bytes
     cells: tuple[Cell, ...]
     config: SweepConfig
     core: int | None
+    begun: bytes | None = None
+
+
+@dataclass(frozen=True)
+class Begun:
+    """What a block has come to, as `kinqp.benchmarks.begun` writes it; to be kept, and answered by anything."""
+
+    content: bytes
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 
-from .messages import Prepare, Ran, Refused, Run, Time, Visiting
+from .messages import Begun, Prepare, Ran, Refused, Run, Time, Visiting
 from .store import Part
 
 if TYPE_CHECKING:
@@ -57,17 +57,29 @@ class Worker:
         return Ran(cell, None, Part("failed", answer.reason)) if isinstance(answer, Refused) else answer
 
     def time(
-        self, problems: bytes, cells: tuple[Cell, ...], config: SweepConfig, core: int | None
-    ) -> Iterator[Visiting | Ran]:
-        """Time a block's cells; a cell in whose visit the process dies has failed, and the others begin again."""
+        self,
+        problems: bytes,
+        cells: tuple[Cell, ...],
+        config: SweepConfig,
+        core: int | None,
+        begun: bytes | None = None,
+    ) -> Iterator[Visiting | Begun | Ran]:
+        """Time a block's cells; where the process dies in a cell's visit that has failed, and the others go on.
+
+        What is `begun` they go on from; a `Begun` is to be kept before the next answer is asked for.
+        """
         deaths: dict[Cell, int] = {}
         while cells:
             visited: Cell | None = None
             kept: list[Ran] = []
             try:
-                for answer in self._stream(Time(problems, cells, config, core), config.cell_timeout):
+                for answer in self._stream(Time(problems, cells, config, core, begun), config.cell_timeout):
                     if isinstance(answer, Visiting):
                         visited = answer.cell
+                        yield answer
+                        continue
+                    if isinstance(answer, Begun):
+                        begun = answer.content
                         yield answer
                         continue
                     kept.append(answer)
@@ -123,8 +135,8 @@ class Worker:
 
     def _stream(self, request: object, timeout: float) -> Iterator[Any]:
         """Send a request and give the answers up to the last, each within `timeout` [s]."""
-        connection = self._started()
         try:
+            connection = self._started()
             connection.send(request)
             while True:
                 until = monotonic() + timeout
@@ -140,6 +152,8 @@ class Worker:
                 yield answer
                 if not isinstance(request, Time):
                     return
+                if isinstance(answer, Begun):
+                    connection.send("kept")
         except (EOFError, OSError) as error:
             raise WorkerDiedError(self._how_it_ended()) from error
 
@@ -160,6 +174,11 @@ class Worker:
         theirs.close()
         self._connection = Connection(ours.detach())
         self._connection.send(list(sys.path))
+        # What a process takes to start, on a busy machine, is no cell's time.
+        if not self._connection.poll(_PREPARE_TIMEOUT):
+            self.stop()
+            raise WorkerDiedError(f"the process did not start within {_PREPARE_TIMEOUT:g} s")
+        self._connection.recv()
         return self._connection
 
     def _how_it_ended(self) -> str:

@@ -15,12 +15,13 @@ from .timing_c import c_replay
 from .visits import Visits, affordable, no_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import polars as pl
     from numpy.typing import NDArray
 
     from ..solvers import QP, Solution
+    from .begun import Progress
     from .cells import Cell
     from .config import SweepConfig
     from .problems import Problems, Window
@@ -41,18 +42,26 @@ class TimedCell:
     problems : Problems
         The block's.
     config : SweepConfig
+    begun : Progress, optional
+        What an earlier process came to.
     """
 
-    def __init__(self, cell: Cell, problems: Problems, config: SweepConfig) -> None:
+    def __init__(self, cell: Cell, problems: Problems, config: SweepConfig, begun: Progress | None = None) -> None:
         self.cell: Final = cell
         self._problems: Final = problems
         self._solver: Final = solver_of(cell)
         self._c: Final = c_replay(self._solver)
-        self._visits: Final = Visits()
+        self.visits: Final = Visits(begun)
         # The first call of all may import, build and allocate.
         self._solver.solve(problems.qps[problems.windows[0].lead][0])
-        self._windows: Final = affordable(
-            problems.windows, config.timing_budget / config.repeats, lambda window: self._window(window, no_rows(), [])
+        self._windows: Final = (
+            begun.windows
+            if begun
+            else affordable(
+                problems.windows,
+                config.timing_budget / config.repeats,
+                lambda window: self._window(window, no_rows(), []),
+            )
         )
         self._sequence: Final = [qp for window in self._windows for qp in self._qps(window)]
         self._fresh: Final = _fresh(self._windows, problems.qps)
@@ -65,7 +74,7 @@ class TimedCell:
             self._window(window, rows, answers)
         times = self._c.seconds(self._sequence, self._fresh) if self._c is not None else None
         c = None if times is None else _per_tick(times, self._windows, self._problems.qps)
-        self._visits.add(repeat, rows, answers, c)
+        self.visits.add(repeat, rows, answers, c)
 
     def result(self) -> tuple[pl.DataFrame, Part]:
         """All times, one tick of one repeat per row, and how the cell ended.
@@ -73,11 +82,15 @@ class TimedCell:
         Columns: `tick`, `repeat`; `wall_setup` of a window's first tick, `wall_update` of all others (null for the
         other kind); `wall_solve`; `own`, the solver's own timer; `c`, the solve in C; all [s].
         """
-        frame = self._visits.frame()
+        frame = self.visits.frame()
         notes = [text for name, text in (("own", _NO_OWN), ("c", _NO_C)) if frame[name].null_count() == len(frame)]
         if frame["own"].null_count() < len(frame):
             notes.append(f"own is {self._solver.own_timer}")
-        return self._visits.result(sum(len(window.ticks) for window in self._windows), notes)
+        return self.visits.result(sum(len(window.ticks) for window in self._windows), notes)
+
+    def progress(self) -> Progress:
+        """How far it has come."""
+        return self.visits.progress(self._windows)
 
     def _window(self, window: Window, rows: dict[str, list[float | int | None]], answers: list[Array]) -> None:
         solver = self._solver
@@ -102,6 +115,9 @@ def time_block(
     config: SweepConfig,
     on_visit: Callable[[Cell, int], None],
     on_failure: Callable[[Cell, str], None],
+    *,
+    begun: Mapping[str, Progress] | None = None,
+    on_progress: Callable[[Callable[[], dict[str, Progress]]], None] | None = None,
 ) -> Iterator[tuple[Cell, pl.DataFrame, Part]]:
     """Time a block's cells beside each other.
 
@@ -119,6 +135,11 @@ def time_block(
         Called with a cell and the number of the repeat before each visit; -1: before it is made ready.
     on_failure : callable
         Called with a cell that raised and what it said; it is not visited again.
+    begun : mapping of str to Progress, optional
+        What an earlier process came to, by the cells' files' stems. Its visits count, and the rest follow: in the same
+        order, but beside those of the earlier process only as far as the machine is still in the same state.
+    on_progress : callable, optional
+        Called after each visit with a function that gives all cells' progress; nothing is timed meanwhile.
 
     Yields
     ------
@@ -126,30 +147,35 @@ def time_block(
         As `TimedCell.result` has them, when all are done.
     """
     timed: dict[Cell, TimedCell | TimedBaseline] = {}
-    rng = np.random.default_rng(config.seed)
+    begun = begun or {}
     with _no_garbage_collection():
         for repeat in range(-1, config.repeats):
-            for index in rng.permutation(len(cells)):
-                cell = cells[index]
-                if repeat >= 0 and cell not in timed:
+            # Sorted and of a seed of its own, so that a continuation takes the rest in the order of the whole.
+            order = np.random.default_rng((config.seed, repeat + 1)).permutation(len(cells))
+            for cell in (sorted(cells)[index] for index in order):
+                if repeat >= 0 and (cell not in timed or repeat < timed[cell].visits.repeats):
                     continue
                 on_visit(cell, repeat)
                 try:
                     if repeat < 0:
-                        timed[cell] = _timed(cell, problems, config)
+                        timed[cell] = _timed(cell, problems, config, begun.get(cell.file_stem))
                     else:
                         timed[cell].visit(repeat)
                 except Exception as error:  # noqa: BLE001  # whatever a solver raises ends this cell, not the others
                     timed.pop(cell, None)
                     on_failure(cell, f"{type(error).__name__}: {error}")
+                if on_progress is not None and repeat >= 0:
+                    on_progress(lambda: {cell.file_stem: one.progress() for cell, one in timed.items()})
     for cell, one in timed.items():
         yield cell, *one.result()
 
 
-def _timed(cell: Cell, problems: Problems | Situations, config: SweepConfig) -> TimedCell | TimedBaseline:
+def _timed(
+    cell: Cell, problems: Problems | Situations, config: SweepConfig, begun: Progress | None
+) -> TimedCell | TimedBaseline:
     if isinstance(problems, Situations):
-        return TimedBaseline(cell, problems, config)
-    return TimedCell(cell, problems, config)
+        return TimedBaseline(cell, problems, config, begun)
+    return TimedCell(cell, problems, config, begun)
 
 
 def _fresh(windows: Sequence[Window], qps: dict[int, tuple[QP, ...]]) -> list[bool]:

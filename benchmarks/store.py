@@ -234,6 +234,10 @@ class Store:
         """Where a block's recorded problems are kept."""
         return self.folder / "problems" / f"{block.file_stem}.npz"
 
+    def begun(self, block: Block) -> Path:
+        """Where what a block's timing has come to is kept until it is done."""
+        return self.folder / "problems" / f"{block.file_stem}.begun"
+
     @property
     def _path(self) -> Path:
         return self.folder / "manifest.json"

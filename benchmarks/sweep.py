@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from .cluster import on_a_cluster
 from .conditions import conditions, timing_core
 from .config import SweepConfig
 from .loading import make_config
-from .messages import Ran
+from .messages import Begun, Ran
 from .processes import Worker
 from .schedule import Recorded, Task, on_this_machine
 from .store import Part, Store, write_whole
@@ -41,7 +41,7 @@ def sweep(
     in one process on one core, with nothing else of the sweep running. A cell whose solver crashes, hangs or runs out
     of memory or disk has failed, and the store says why; the others go on. Each file is written whole or not at all
     as soon as there is something to write: interrupted in any way, the folder keeps all but the cells being run, or
-    the times of the block being timed. What could not be written is in the store's `unwritten`.
+    the last five seconds of timing. What could not be written is in the store's `unwritten`.
 
     Parameters
     ----------
@@ -151,11 +151,17 @@ class _Sweep:
                     for cell in cells:
                         self._end(Ran(cell, None, Part("failed", "the block has no recorded problems")))
                     continue
-                for answer in worker.time(path.read_bytes(), tuple(cells), self._config, timing_core()):
+                place = self._store.begun(block)
+                begun = place.read_bytes() if place.exists() else None
+                for answer in worker.time(path.read_bytes(), tuple(cells), self._config, timing_core(), begun):
                     if isinstance(answer, Ran):
                         self._end(answer)
+                    elif isinstance(answer, Begun):
+                        with suppress(OSError):  # without it more is lost if all is killed, and nothing else
+                            write_whole(place, answer.content)
                     else:
                         self._progress(f"timing {answer.cell}")
+                place.unlink(missing_ok=True)
         finally:
             worker.close()
             worker.stop()

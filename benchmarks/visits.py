@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 from time import perf_counter
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
 import polars as pl
 
+from .begun import Progress
 from .problems import Window
 from .store import Part
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -60,12 +62,19 @@ def affordable(windows: Sequence[Window], budget: float, visit: Callable[[Window
 
 
 class Visits:
-    """Times of a cell, visit by visit, and whether all visits gave the same answers, bit for bit."""
+    """Times of a cell, visit by visit, and whether all visits gave the same answers, bit for bit.
 
-    def __init__(self) -> None:
-        self._frames: Final[list[pl.DataFrame]] = []
-        self._first: list[Array] | None = None
-        self._deterministic = True
+    Parameters
+    ----------
+    begun : Progress, optional
+        Visits of an earlier process, that count as this one's.
+    """
+
+    def __init__(self, begun: Progress | None = None) -> None:
+        self._frames: Final[list[pl.DataFrame]] = [begun.frame] if begun and begun.repeats else []
+        self.repeats = begun.repeats if begun else 0
+        self._digest = begun.digest if begun else ""
+        self._deterministic = begun.deterministic if begun else True
 
     def add(self, repeat: int, rows: Rows, answers: list[Array], c: Sequence[float] | None = None) -> None:
         """Keep a visit: its times, its answers, and times in C where there are any [s]."""
@@ -74,19 +83,23 @@ class Visits:
             frame.with_columns(
                 pl.lit(repeat, dtype=pl.Int64).alias("repeat"),
                 pl.Series("c", [None] * len(frame) if c is None else c, dtype=pl.Float64),
-            )
+            ).select(_COLUMNS)
         )
-        if self._first is None:
-            self._first = answers
-        self._deterministic &= all(
-            np.array_equal(a, b, equal_nan=True) for a, b in zip(self._first, answers, strict=True)
-        )
+        self.repeats += 1
+        digest = hashlib.blake2b(b"".join(answer.tobytes() for answer in answers), digest_size=16).hexdigest()
+        self._digest = self._digest or digest
+        self._deterministic &= digest == self._digest
 
     def result(self, ticks: int, notes: Sequence[str]) -> tuple[pl.DataFrame, Part]:
         """Give all times, one tick of one repeat per row, and how the cell ended; `ticks` were timed in each repeat."""
-        frame = self.frame()
-        return frame, Part("done", "", "replay", ticks, len(self._frames), self._deterministic, tuple(notes))
+        part = Part("done", "", "replay", ticks, self.repeats, self._deterministic, tuple(notes))
+        return self.frame(), part
 
     def frame(self) -> pl.DataFrame:
-        """All times so far."""
-        return pl.concat(self._frames).select(_COLUMNS)
+        """All times so far; at least one visit's."""
+        return pl.concat(self._frames)
+
+    def progress(self, windows: tuple[Window, ...]) -> Progress:
+        """How far the cell has come, for another process to go on from."""
+        frame = self.frame() if self.repeats else pl.DataFrame()
+        return Progress(windows, frame, self.repeats, self._digest, self._deterministic)

@@ -8,13 +8,17 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
+from importlib import import_module
 from multiprocessing.connection import Connection
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Final
 
-from .messages import Prepare, Ran, Refused, Run, Time, Visiting
+from .messages import Begun, Prepare, Ran, Refused, Run, Time, Visiting
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .accuracy import PreparedBlock
     from .baseline_block import BaselineBlock
     from .cells import Block, Cell
@@ -22,6 +26,8 @@ if TYPE_CHECKING:
 
     _Key = tuple[Block, SweepConfig]
 
+# How much timing may be lost when all is killed [s]; keeping it takes some milliseconds, in which nothing is timed.
+_KEEP_EVERY: Final = 5.0
 # Prepared blocks that a worker keeps: on a cluster neighbouring cells come in any order.
 _KEPT: Final = 3
 
@@ -71,6 +77,7 @@ def _run(cell: Cell, block: PreparedBlock | BaselineBlock) -> Ran:
 
 
 def _time(request: Time, connection: Connection) -> None:
+    from .begun import Progress, from_bytes, to_bytes
     from .problems import Problems
     from .replay import time_block
     from .scenarios import get_scenario
@@ -80,6 +87,15 @@ def _time(request: Time, connection: Connection) -> None:
     if request.core is not None:
         os.sched_setaffinity(0, {request.core})
     first, problems = request.cells[0], request.problems
+    last = monotonic()
+
+    def on_progress(progress: Callable[[], dict[str, Progress]]) -> None:
+        nonlocal last
+        if monotonic() - last > _KEEP_EVERY:
+            connection.send(Begun(to_bytes(progress())))
+            connection.recv()
+            last = monotonic()
+
     for cell, frame, part in time_block(
         Situations.from_bytes(problems, get_scenario(first.scenario))
         if first.is_baseline
@@ -88,6 +104,8 @@ def _time(request: Time, connection: Connection) -> None:
         request.config,
         lambda cell, repeat: connection.send(Visiting(cell, repeat)),
         lambda cell, reason: connection.send(Ran(cell, None, Part("failed", reason))),
+        begun=from_bytes(request.begun) if request.begun is not None else None,
+        on_progress=on_progress,
     ):
         connection.send(Ran(cell, parquet(frame), part))
 
@@ -96,6 +114,10 @@ def main() -> None:
     """Serve the connection whose file descriptor is the first argument."""
     connection: Connection[Any, Any] = Connection(int(sys.argv[1]))
     sys.path[:] = connection.recv()
+    # Not when they are first asked for, which is in a cell's time.
+    for module in ("accuracy", "replay"):
+        import_module(f"{__spec__.parent}.{module}")
+    connection.send("ready")
     # Where memory runs out, the kernel is to take this process, and not the one that keeps the results.
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000", encoding="ascii")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,10 +11,14 @@ from hypothesis import strategies as st
 
 from kinqp.benchmarks import Block, Cell, SweepConfig
 from kinqp.benchmarks.accuracy import PreparedBlock
+from kinqp.benchmarks.begun import Progress, from_bytes, to_bytes
 from kinqp.benchmarks.problems import Problems, choose_windows, ticks_of
 from kinqp.benchmarks.replay import TimedCell, time_block
 from kinqp.benchmarks.timing_c import c_replay
 from kinqp.solvers import get_solver
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 HERE = "tests.benchmarks.tiny:"
 CONFIG = SweepConfig(repeats=3, timing_ticks=12, timing_window=4)
@@ -135,3 +141,60 @@ def test_answers_that_change_between_repeats_are_noticed_and_mistakes_end_the_ce
     assert failed == {cells[1]: "KeyError: 'no such row'"}
     assert not parts[cells[0]].deterministic
     assert parts[cells[2]].deterministic
+
+
+def test_a_continuation_does_the_visits_that_are_missing_in_the_order_of_the_whole() -> None:
+    recorded = problems("tiny")
+    cells = [Cell(HERE + "tiny", "joint-space-robust", name) for name in ("active-set", "clarabel", HERE + "Drifting")]
+    whole: list[tuple[Cell, int]] = []
+    kept: list[bytes] = []
+
+    def until(stop: int) -> Callable[[Callable[[], dict[str, Progress]]], None]:
+        def on_progress(progress: Callable[[], dict[str, Progress]]) -> None:
+            kept.append(to_bytes(progress()))
+            if len(kept) == stop:
+                raise KeyboardInterrupt
+
+        return on_progress
+
+    note = lambda cell, repeat: whole.append((cell, repeat))  # noqa: E731  # two lines for it would say no more
+    list(time_block(recorded, cells, CONFIG, note, lambda *_: None))
+    seen: list[tuple[Cell, int]] = []
+    with pytest.raises(KeyboardInterrupt):
+        list(time_block(recorded, cells, CONFIG, lambda *visit: seen.append(visit), lambda *_: None,
+                        on_progress=until(4)))  # fmt: skip
+    assert seen == whole[:7]
+    again: list[tuple[Cell, int]] = []
+    begun = from_bytes(kept[-1])
+    assert sorted(one.repeats for one in begun.values()) == [1, 1, 2]
+    # In the reverse order of cells, as another process may have it.
+    done = list(
+        time_block(recorded, cells[::-1], CONFIG, lambda *visit: again.append(visit), lambda *_: None, begun=begun)
+    )
+    assert [visit for visit in again if visit[1] >= 0] == whole[7:]
+    parts = {cell: (frame, part) for cell, frame, part in done}
+    for cell in cells:
+        frame, part = parts[cell]
+        earlier = begun[cell.file_stem].frame
+        assert frame.head(len(earlier)).equals(earlier)
+        assert sorted(set(frame["repeat"])) == [0, 1, 2]
+        assert part.repeats == 3
+        assert len(frame) == 3 * len(frame.filter(frame["repeat"] == 0))
+        assert set(frame.filter(frame["repeat"] == 2)["tick"]) == set(earlier["tick"])
+    # What an earlier process was answered is compared with, too.
+    assert [parts[cell][1].deterministic for cell in cells] == [True, True, False]
+
+
+def test_a_baselines_visits_are_continued_too() -> None:
+    from kinqp.benchmarks.baseline_block import BaselineBlock
+
+    cell = Cell.of_baseline(HERE + "tiny", "task-priority")
+    recorded = BaselineBlock(cell.block, CONFIG).problems
+    kept: list[bytes] = []
+    list(time_block(recorded, [cell], CONFIG, lambda *_: None, lambda *_: None,
+                    on_progress=lambda progress: kept.append(to_bytes(progress()))))  # fmt: skip
+    seen: list[int] = []
+    ((_, frame, part),) = time_block(recorded, [cell], CONFIG, lambda _, repeat: seen.append(repeat), lambda *_: None,
+                                     begun=from_bytes(kept[1]))  # fmt: skip
+    assert seen == [-1, 2]
+    assert (part.repeats, part.deterministic, sorted(set(frame["repeat"]))) == (3, True, [0, 1, 2])

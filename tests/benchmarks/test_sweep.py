@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ import polars as pl
 import pytest
 
 from kinqp.benchmarks import Cell, Store, StoreError, cells_of, make_config, sweep, sweep_table
+from kinqp.benchmarks.begun import from_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -252,6 +254,48 @@ def test_a_disk_that_is_really_full_ends_what_does_not_fit(tmp_path: Path) -> No
     assert first["read"] == 20 * first["cells"]
     assert second == {"unwritten": {}, "failed": 0, "cells": CELLS, "timed": CELLS, "partial": 0, "read": 20 * CELLS}
     assert first["partial"] == 0
+
+
+SLOW = {
+    "scenarios": [HERE + "tiny"], "formulations": ["joint-space"], "solvers": [HERE + "Slow", "active-set"],
+    "repeats": 40, "timing_ticks": 18, "timing_window": 18, "timing_budget": 1e3,
+}  # fmt: skip
+SLOW_SWEEP = """
+import sys
+from kinqp.benchmarks import sweep
+from tests.benchmarks.test_sweep import SLOW
+sweep(SLOW, sys.argv[1], workers=1)
+"""
+
+
+@pytest.mark.long
+def test_a_sweep_killed_while_it_times_goes_on_with_the_visits_that_are_missing(tmp_path: Path) -> None:
+    here = str(Path(__file__).parents[2])
+    process = subprocess.Popen(
+        [sys.executable, "-c", SLOW_SWEEP, str(tmp_path / "out")], cwd=here, env=os.environ | {"PYTHONPATH": here}
+    )
+    try:
+        until = monotonic() + 120.0
+        while not list((tmp_path / "out").glob("problems/*.begun")):
+            assert process.poll() is None
+            assert monotonic() < until
+            sleep(0.05)
+    finally:
+        process.kill()
+        process.wait()
+    (file,) = (tmp_path / "out").glob("problems/*.begun")
+    kept = {name: one.repeats for name, one in from_bytes(file.read_bytes()).items()}
+    assert all(repeats >= 5 for repeats in kept.values())
+    visits: list[str] = []
+    store = sweep(SLOW, tmp_path / "out", resume=True, workers=1,
+                  on_progress=lambda _done, _total, what: visits.append(what))  # fmt: skip
+    timed = [what for what in visits if what.startswith("timing ")]
+    # Each is made ready once, and visited as often as is missing.
+    assert len(timed) == 2 + 2 * 40 - sum(kept.values())
+    assert not file.exists()
+    for cell in store.manifest.cells:
+        assert sorted(set(store.times(cell)["repeat"])) == list(range(40))
+        assert store.outcome(cell).timing.repeats == 40
 
 
 def test_a_sweep_measured_elsewhere_is_not_continued(tmp_path: Path) -> None:
