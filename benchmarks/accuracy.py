@@ -51,6 +51,8 @@ class State:
         [rad or m, .../s].
     v : ndarray, shape (m_free,)
         [m/s, rad/s].
+    qdd_prev : ndarray, shape (nv,), or None
+        None where the state has no history [rad/s^2 or m/s^2].
     """
 
     tick: int
@@ -59,6 +61,7 @@ class State:
     q: Array
     qd_prev: Array
     v: Array
+    qdd_prev: Array | None = None
 
 
 class PreparedBlock:
@@ -123,14 +126,16 @@ class PreparedBlock:
             return
         robot, dt = self.scenario.robot, self.scenario.dt
         q, qd, tick = np.array(self.scenario.q0, dtype=float), np.zeros(robot.nv), 0
+        qdd = np.zeros(robot.nv)
         for index, phase in enumerate(self.scenario.phases):
             free = list(phase.mode.free_rows)
             for k in range(round(phase.duration / dt)):
                 pose = robot.pose(q)
                 v = (phase.mode.twist_map_at(pose) @ phase.guide.twist(k * dt, pose))[free]
-                state = State(tick, index, phase.mode, q, qd, v)
+                state = State(tick, index, phase.mode, q, qd, v, qdd)
                 result = self._solve(steps[phase.mode], state)
                 yield state, steps[phase.mode], result
+                qdd = (result.qd - qd) / dt
                 qd = result.qd
                 q = q + dt * qd
                 tick += 1
@@ -148,7 +153,8 @@ class PreparedBlock:
         ]
 
     def _solve(self, step: InterpretedStep, state: State) -> StepResult:
-        remembered = {"qd_prev": state.qd_prev} if "qd_prev" in step.inputs else {}
+        memory = {"qd_prev": state.qd_prev, "qdd_prev": state.qdd_prev}
+        remembered = {name: last for name, last in memory.items() if name in step.inputs and last is not None}
         return step(state.q, state.v, **self._inputs[state.mode], **remembered)
 
     def _row(self, state: State, step: InterpretedStep, result: StepResult) -> dict[str, Any]:
@@ -197,7 +203,8 @@ class PreparedBlock:
         if state.tick >= len(self._states):
             return False
         known = self._states[state.tick]
-        return all(np.array_equal(getattr(state, name), getattr(known, name)) for name in ("q", "qd_prev", "v"))
+        names = ("q", "qd_prev", "v", "qdd_prev")
+        return all(np.array_equal(getattr(state, name), getattr(known, name)) for name in names)
 
 
 def _trusted_command(levels: Sequence[tuple[Instance, Solution]]) -> Array | None:
