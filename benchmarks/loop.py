@@ -37,6 +37,8 @@ class State:
         [rad or m, .../s].
     v : ndarray, shape (m_free,)
         [m/s, rad/s].
+    qdd_prev : ndarray, shape (nv,), or None
+        None where the state has no history [rad/s^2 or m/s^2].
     """
 
     tick: int
@@ -45,6 +47,7 @@ class State:
     q: Array
     qd_prev: Array
     v: Array
+    qdd_prev: Array | None = None
 
 
 def each_tick(
@@ -63,14 +66,16 @@ def each_tick(
         return
     robot, dt = scenario.robot, scenario.dt
     q, qd, tick = np.array(scenario.q0, dtype=float), np.zeros(robot.nv), 0
+    qdd = np.zeros(robot.nv)
     for index, phase in enumerate(scenario.phases):
         free = list(phase.mode.free_rows)
         for k in range(round(phase.duration / dt)):
             pose = robot.pose(q)
             v = (phase.mode.twist_map_at(pose) @ phase.guide.twist(k * dt, pose))[free]
-            state = State(tick, index, phase.mode, q, qd, v)
+            state = State(tick, index, phase.mode, q, qd, v, qdd)
             result = act(state)
             yield state, result
+            qdd = (result.qd - qd) / dt
             qd = result.qd
             q = q + dt * qd
             tick += 1
@@ -95,7 +100,8 @@ def fixed_inputs(block: Block, scenario: Scenario, step: InterpretedStep | Basel
 
 def remembered(step: InterpretedStep | BaselineStep, state: State) -> dict[str, Array]:
     """Run-time inputs that a tick is given of the one before, where the step takes them."""
-    return {"qd_prev": state.qd_prev} if "qd_prev" in step.inputs else {}
+    memory = {"qd_prev": state.qd_prev, "qdd_prev": state.qdd_prev}
+    return {name: last for name, last in memory.items() if name in step.inputs and last is not None}
 
 
 def row_of(scenario: Scenario, state: State, result: StepResult, bounds: tuple[Array, Array]) -> dict[str, Any]:
