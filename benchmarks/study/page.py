@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from .. import report
 from . import tables
 from .animation import animation
 from .limitations import limitations
@@ -60,7 +61,7 @@ def page(found: Findings, drawn: Mapping[str, tuple[PanelFigure, ...]]) -> str:
 
     study, settings = found.study, found.study.settings
     assets = files(__package__) / "assets"
-    css = (files("kinqp.benchmarks.report") / "assets" / "page.css").read_text(encoding="utf-8")
+    css = (files(report) / "assets" / "page.css").read_text(encoding="utf-8")
     css += (assets / "study.css").read_text(encoding="utf-8")
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     template = environment.from_string((assets / "page.html.j2").read_text(encoding="utf-8"))
