@@ -125,7 +125,9 @@ class PreparedBlock:
         if state.tick >= len(self._states):
             return False
         known = self._states[state.tick]
-        return all(np.array_equal(getattr(state, name), getattr(known, name)) for name in ("q", "qd_prev", "v", "qdd_prev"))
+        return all(
+            np.array_equal(getattr(state, name), getattr(known, name)) for name in ("q", "qd_prev", "v", "qdd_prev")
+        )
 
 
 def _trusted_command(levels: Sequence[tuple[Instance, Solution]]) -> Array | None:
