@@ -72,6 +72,7 @@ class GuidedRun:
     status, mode, phase, active : tuple
         As in `GuidingResult`.
     iterations : ndarray of int, shape (N,)
+        -1 where the solver tells none.
     drift : ndarray, shape (N, 2)
         Distance and angle of the locked rows from where the mode was engaged [m, rad].
     yielded : ndarray of bool, shape (N,)
@@ -213,7 +214,7 @@ class _Record:
             mode=tuple(result.mode for result in results),
             phase=tuple(result.phase for result in results),
             active=tuple(result.active for result in results),
-            iterations=np.array([result.iterations for result in results], dtype=np.int64),
+            iterations=np.array([-1 if r.iterations is None else r.iterations for r in results], dtype=np.int64),
             yielded=np.array([result.yielded for result in results]),
             q_end=q_end,
             **{name: values[:count] for name, values in self._arrays.items()},

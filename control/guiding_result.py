@@ -36,8 +36,8 @@ class GuidingResult(NamedTuple):
         What the command gives of it, J_free qd [m/s, rad/s].
     status : Status
         Of the tick: SOLVED, or why the command is the safe stop; SOLVED too where there is nothing to solve.
-    iterations : int
-        As the solver counts them.
+    iterations : int or None
+        As the solver counts them; None where it tells none.
     active : tuple of str
         Rows that hold the command back.
     mode : Mode
@@ -54,7 +54,7 @@ class GuidingResult(NamedTuple):
     v: Array
     v_actual: Array
     status: Status
-    iterations: int
+    iterations: int | None
     active: tuple[str, ...]
     mode: Mode
     phase: GuidingPhase

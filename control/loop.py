@@ -37,8 +37,8 @@ class Command(Protocol):
         """SOLVED, or why the command is the safe stop."""
 
     @property
-    def iterations(self) -> int:
-        """As the solver counts them."""
+    def iterations(self) -> int | None:
+        """As the solver counts them; None where it tells none."""
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -102,6 +102,7 @@ class Trajectory:
         Cartesian error [m/s, rad/s].
     status : tuple of Status
     iterations : ndarray of int, shape (N,)
+        -1 where the solver tells none.
     active : tuple of tuple of str
         Names of the rows that held the command back.
     fixed_error, bound_violation, sigma_min, setup_time, solve_time : ndarray, shape (N,)
@@ -201,6 +202,7 @@ def simulate(
     columns: dict[str, object] = {
         field.name: [getattr(result, field.name) for result in results] for field in fields(results[0])
     }
+    columns["iterations"] = [-1 if result.iterations is None else result.iterations for result in results]
     return Trajectory(
         t=np.arange(ticks, dtype=np.float64) * dt,
         q=np.array(states),
