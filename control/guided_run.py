@@ -72,7 +72,7 @@ class GuidedRun:
     status, mode, phase, active : tuple
         As in `GuidingResult`.
     iterations : ndarray of int, shape (N,)
-        -1 where the solver does not count them.
+        -1 where the solver tells none.
     drift : ndarray, shape (N, 2)
         Distance and angle of the locked rows from where the mode was engaged [m, rad].
     yielded : ndarray of bool, shape (N,)

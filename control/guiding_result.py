@@ -37,7 +37,7 @@ class GuidingResult(NamedTuple):
     status : Status
         Of the tick: SOLVED, or why the command is the safe stop; SOLVED too where there is nothing to solve.
     iterations : int or None
-        As the solver counts them; None where it does not.
+        As the solver counts them; None where it tells none.
     active : tuple of str
         Rows that hold the command back.
     mode : Mode

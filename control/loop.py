@@ -38,7 +38,7 @@ class Command(Protocol):
 
     @property
     def iterations(self) -> int | None:
-        """As the solver counts them; None where it does not."""
+        """As the solver counts them; None where it tells none."""
 
     @property
     def active(self) -> tuple[str, ...]:
@@ -102,6 +102,7 @@ class Trajectory:
         Cartesian error [m/s, rad/s].
     status : tuple of Status
     iterations : ndarray of int, shape (N,)
+        -1 where the solver tells none.
     active : tuple of tuple of str
         Names of the rows that held the command back.
     fixed_error, bound_violation, sigma_min, setup_time, solve_time : ndarray, shape (N,)
@@ -154,8 +155,8 @@ def simulate(
     Parameters
     ----------
     step : Step
-        The controller; `dt` is handed to it at every tick and, where it takes them, the last command as `qd_prev` and
-        its difference from the one before over `dt` as `qdd_prev` (the arm starts at rest).
+        The controller; `dt` is handed to it at every tick, and the last command as `qd_prev` where it takes one (the
+        arm starts at rest).
     guide : Guide
         Gives the twist asked for.
     q0 : array_like, shape (nv,)
@@ -183,19 +184,17 @@ def simulate(
         raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
     free = list(step.mode.free_rows)
     q = np.array(q0, dtype=float)
-    memory = {name: np.zeros(step.robot.nv) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
+    remembers = "qd_prev" in step.inputs
     qd = np.zeros(step.robot.nv)
     states, twists, positions, results = [], [], [], []
     for tick in range(ticks):
         pose = step.robot.pose(q)
         v = (step.mode.twist_map_at(pose) @ guide.twist(tick * dt, pose))[free]
-        result = step(q, v, dt=dt, **memory)
+        result = step(q, v, dt=dt, **({"qd_prev": qd} if remembers else {}))
         states.append(q)
         twists.append(v)
         positions.append(pose[:3, 3])
         results.append(result)
-        now = {"qd_prev": result.qd, "qdd_prev": (result.qd - qd) / dt}
-        memory = {name: now[name] for name in memory}
         qd = result.qd
         q = q + dt * qd
         if on_tick is not None:
@@ -203,6 +202,7 @@ def simulate(
     columns: dict[str, object] = {
         field.name: [getattr(result, field.name) for result in results] for field in fields(results[0])
     }
+    columns["iterations"] = [-1 if result.iterations is None else result.iterations for result in results]
     return Trajectory(
         t=np.arange(ticks, dtype=np.float64) * dt,
         q=np.array(states),

@@ -132,3 +132,10 @@ def test_a_step_that_remembers_gets_the_last_command() -> None:
     step = make_step(load_robot("lbr_med14"), Counting(), "free")
     run = simulate(step, Still(), np.zeros(7), 0.005)
     np.testing.assert_allclose(run.qd, np.outer(1e-3 * np.arange(1, 6), np.ones(7)), atol=1e-15)
+
+
+def test_a_solver_that_tells_no_iterations_counts_minus_one() -> None:
+    step = make_step(load_robot("lbr_med14"), "joint-space", "fix-orientation", solver="qpsolvers:daqp")
+    run = simulate(step, FOLLOWER, np.deg2rad([-55.0, 65.0, 10.0, -90.0, -5.0, 30.0, 0.0]), 0.003)
+    assert run.iterations.tolist() == [-1] * 3
+    assert set(run.status) == {Status.SOLVED}
