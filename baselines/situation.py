@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
-import casadi as ca
 import numpy as np
 
 from ..formulations import Tick
+from ..formulations.buffered import BufferedFunction
 from ..formulations.inputs import complete_inputs
 from .linear import factor
 
@@ -134,20 +134,9 @@ class Observer:
         results = {name: getattr(tick, name) for name in _OBSERVED} | {f"extra {name}": e for name, e in extras.items()}
         self.mode: Final = mode
         self.inputs: Final = tick.inputs
-        # CasADi writes column by column, NumPy reads row by row: hence the transposes.
-        function = ca.Function(
-            "observe",
-            [given.symbol for given in self.inputs],
-            [ca.densify(ca.SX(value).T) for value in results.values()],
+        self._function: Final = BufferedFunction(
+            "observe", {given.name: given.symbol for given in self.inputs}, results
         )
-        # The pair must be kept together: the buffer owns what the call works on.
-        self._buffer, self._evaluate = function.buffer()
-        self._given: Final = {given.name: np.zeros(given.size) for given in self.inputs}
-        for index, values in enumerate(self._given.values()):
-            self._buffer.set_arg(index, memoryview(values))  # type: ignore[arg-type,call-arg]  # CasADi's stubs give the C++ signature
-        self._results: Final = {name: np.zeros(value.shape) for name, value in results.items()}
-        for index, matrix in enumerate(self._results.values()):
-            self._buffer.set_res(index, memoryview(matrix.reshape(-1)))  # type: ignore[arg-type,call-arg]  # as above
 
     def __call__(self, given: Mapping[str, ArrayLike]) -> Situation:
         """Evaluate at a state.
@@ -158,11 +147,10 @@ class Observer:
             Naming an input that is unknown, missing, of the wrong size, not finite or out of its range.
         """
         for name, value in complete_inputs(self.inputs, given, self.mode).items():
-            self._given[name][:] = value
-        self._evaluate()
-        found = {name: matrix.copy() for name, matrix in self._results.items()}
+            self._function.given[name][:] = value
+        found = self._function.copies()
         return Situation(
-            inputs={name: value.copy() for name, value in self._given.items()},
+            inputs={name: value.copy() for name, value in self._function.given.items()},
             J_free=found["J_free"],
             J_fixed=found["J_fixed"],
             qd_lo=found["qd_lo"][:, 0],

@@ -15,7 +15,7 @@ from .situation import Observer
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Mode
+    from ..formulations import Input, Mode
     from ..robots import Robot
     from .base import Baseline, Promise, Resolved
     from .situation import Situation
@@ -54,6 +54,11 @@ class BaselineStep:
         self.baseline: Final = baseline
         self.solver: Final = NoSolver()
         self._observe: Final = Observer(baseline, robot, mode)
+
+    @property
+    def specs(self) -> tuple[Input, ...]:
+        """What a call takes: `q`, `v` and the run-time inputs, with their sizes, defaults and ranges."""
+        return self._observe.inputs
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ from ..benchmarks import (
 )
 from ..benchmarks.worst_case import CaseError
 from ..codegen import CurvatureError, ExportError, export_c
+from ..control import export_guiding
 from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
 from ..solvers import OptionError, UnknownOptionError, available_solvers
@@ -160,9 +161,12 @@ def run_export(
     out: Annotated[Path, typer.Option(help="Folder to write to.")],
     tip: Annotated[str | None, typer.Option(help="Frame at the tool centre point, where the URDF branches.")] = None,
     name: Annotated[str | None, typer.Option(help="Prefix of files and symbols.")] = None,
+    *,
+    guiding: Annotated[bool, typer.Option("--guiding", help="With the hand-guiding controller around it.")] = False,
 ) -> None:
-    """Write a formulation on a robot as a C library that checks itself."""
-    folder = export_c(load_robot(robot, tip=tip), formulation, mode, out, name=name)
+    """Write a formulation on a robot as a C library that checks itself; with --guiding, the whole controller."""
+    export = export_guiding if guiding else export_c
+    folder = export(load_robot(robot, tip=tip), formulation, mode, out, name=name)
     console = _console()
     console.print(f"Wrote {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))} to {folder}.")
     build = folder / "build"

@@ -114,6 +114,11 @@ class CompiledStep:
         self._no_sides.flags.writeable = False
 
     @property
+    def specs(self) -> tuple[Input, ...]:
+        """What a call takes: `q`, `v` and the run-time inputs, with their sizes, defaults and ranges."""
+        return tuple(self._specs.values())
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of the run-time inputs, beyond `q` and `v`, that a call takes by keyword."""
         return tuple(name for name in self._specs if name not in ("q", "v"))

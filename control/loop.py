@@ -14,15 +14,39 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Mode, StepResult
+    from ..formulations import Input, Mode, StepResult
     from ..robots import Robot
     from ..solvers import Status
 
     Array = NDArray[np.float64]
 
 
-class Step(Protocol):
-    """What the loop asks of a controller; `make_step` makes one."""
+class Command(Protocol):
+    """What every control cycle gives, interpreted or compiled."""
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocity command, shape (nv,) [rad/s or m/s]."""
+
+    @property
+    def eps(self) -> Array:
+        """Cartesian error, shape (m_free,) [m/s, rad/s]."""
+
+    @property
+    def status(self) -> Status:
+        """SOLVED, or why the command is the safe stop."""
+
+    @property
+    def iterations(self) -> int:
+        """As the solver counts them."""
+
+    @property
+    def active(self) -> tuple[str, ...]:
+        """Rows that hold the command back."""
+
+
+class AnyStep(Protocol):
+    """A control cycle, interpreted (`make_step`) or compiled (`compile_step`)."""
 
     @property
     def robot(self) -> Robot:
@@ -33,8 +57,19 @@ class Step(Protocol):
         """The motion mode."""
 
     @property
+    def specs(self) -> tuple[Input, ...]:
+        """What a call takes: `q`, `v` and the run-time inputs."""
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what a call takes by keyword beyond the state and the twist."""
+
+    def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> Command:
+        """Give the command at a state."""
+
+
+class Step(AnyStep, Protocol):
+    """What `simulate` asks of a controller: a cycle that tells all; `make_step` makes one."""
 
     def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
         """Give the command at a state."""

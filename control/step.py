@@ -25,7 +25,7 @@ from ..solvers import PluginError, Status, get_solver
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Formulation, Instance
+    from ..formulations import Formulation, Input, Instance
     from ..robots import Robot
     from ..solvers import Solution, Solver
 
@@ -67,6 +67,15 @@ class InterpretedStep:
         # Not an attribute that changes: the copy is new, and this is where it is made.
         made.__dict__.update(solver=solver, solved=())
         return made
+
+    @property
+    def specs(self) -> tuple[Input, ...]:
+        """What a call takes: `q`, `v` and the run-time inputs, with their sizes, defaults and ranges."""
+        return tuple(
+            {
+                given.name: given for level in self._levels for given in level.inputs if given.name in self._inputs
+            }.values()
+        )
 
     @property
     def inputs(self) -> tuple[str, ...]:

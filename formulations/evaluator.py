@@ -9,12 +9,11 @@ import casadi as ca
 import numpy as np
 
 from ..solvers import QP
+from .buffered import BufferedFunction
 from .inputs import complete_inputs
 from .lowering import DATA, Lowered
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import ArrayLike, NDArray
 
     from ..solvers import Solution
@@ -82,20 +81,9 @@ class Evaluator:
         data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
         self.inputs: Final[tuple[Input, ...]] = tick.inputs
         outputs = data | {name: value for name, value in observed.items() if name != "v_fixed"}
-        # CasADi writes column by column, NumPy reads row by row: hence the transposes.
-        function = ca.Function(
-            "evaluate",
-            [given.symbol for given in self.inputs],
-            [ca.densify(ca.SX(value).T) for value in outputs.values()],
+        self._function: Final = BufferedFunction(
+            "evaluate", {given.name: given.symbol for given in self.inputs}, outputs
         )
-        # The pair must be kept together: the buffer owns what the call works on.
-        self._buffer, self._evaluate = function.buffer()
-        self._given: Final = {given.name: np.zeros(given.size) for given in self.inputs}
-        for index, values in enumerate(self._given.values()):
-            self._buffer.set_arg(index, memoryview(values))  # type: ignore[arg-type,call-arg]  # CasADi's stubs give the C++ signature
-        self._results: Final = {name: np.zeros(value.shape) for name, value in outputs.items()}
-        for index, matrix in enumerate(self._results.values()):
-            self._buffer.set_res(index, memoryview(matrix.reshape(-1)))  # type: ignore[arg-type,call-arg]  # as above
 
     def __call__(self, **inputs: ArrayLike) -> Instance:
         """Evaluate at a state.
@@ -110,9 +98,10 @@ class Evaluator:
         InputError
             Naming an input that is unknown, missing, of the wrong size, not finite or out of its range.
         """
-        self._fill(inputs)
-        self._evaluate()
-        r = {name: matrix.copy() for name, matrix in self._results.items()}
+        given = self._function.given
+        for name, value in complete_inputs(self.inputs, inputs, self.lowered.mode).items():
+            given[name][:] = value
+        r = self._function.copies()
         columns = {name: r[name][:, 0] for name in ("g", "b", "l", "u", "lb", "ub", "k", "qd_lo", "qd_hi", "stop")}
         start = r["x_feasible"]
         qp = QP.trusted(
@@ -121,12 +110,8 @@ class Evaluator:
         )  # fmt: skip
         return Instance(
             qp, r["K"], columns["k"], r["J_free"], r["J_fixed"], r["J_bar"], columns["qd_lo"], columns["qd_hi"],
-            self._given["v"].copy(), self._given["v_fixed"].copy(), columns["stop"],
+            given["v"].copy(), given["v_fixed"].copy(), columns["stop"],
         )  # fmt: skip
-
-    def _fill(self, inputs: Mapping[str, ArrayLike]) -> None:
-        for name, value in complete_inputs(self.inputs, inputs, self.lowered.mode).items():
-            self._given[name][:] = value
 
     def active_rows(self, qp: QP, solution: Solution) -> tuple[str, ...]:
         """Names of the rows that hold the solution back, each with its side, as in "joint limits[3] upper"."""

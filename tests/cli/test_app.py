@@ -179,6 +179,10 @@ def test_export_writes_a_folder_and_says_what_next(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "ctest --test-dir" in done.stdout.replace("\n", " ")
     assert (out / "kinqp_lbr_med14_cartesian_error.c").exists()
+    assert not list(out.glob("*guiding*"))
+    whole = kinqp("export", "--robot", "lbr_med14", "--guiding", *options)
+    assert whole.returncode == 0, whole.stderr
+    assert (out / "kinqp_lbr_med14_cartesian_error_guiding.c").exists()
     wrong = kinqp("export", "--robot", "lbr_med41", *options)
     assert wrong.returncode == 2
     assert "lbr_med14" in wrong.stderr

@@ -1,0 +1,224 @@
+"""The hand-guiding controller: from the hand's wrench to joint velocities, tick by tick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from ..formulations import DEFAULT_DT, InputError, Mode, check_input
+from ..solvers import Status
+from .checks import checked_array, checked_modes, checked_period
+from .guiding_result import GuidingPhase, GuidingResult
+from .guiding_settings import GuidingSettings
+from .guiding_unit import GuidingUnit
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from ..formulations import Input
+    from .loop import AnyStep, Command
+
+    Array = NDArray[np.float64]
+
+
+class GuidingController:
+    """Admittance, drift compensation, motion modes and limits around the steps of a formulation or a baseline.
+
+    - The hand's wrench moves the tool along the guided rows as if it were a mass in oil (`admit`).
+    - A mode is engaged at rest: on `engage` the hand loses its effect, the tool comes to rest, its pose is anchored
+      and the new mode begins with it. Neither the command nor the pose jumps. `stop` brings it to rest likewise.
+    - The locked rows are taken back to the anchor where they drift; where joint limits can't follow that correction,
+      it gives way for that tick, and the locked rows stay where they are.
+    - Joint velocity limits may be changed at any time: they take effect no faster than the acceleration limits let a
+      joint follow.
+    - A tick whose QP is not solved sends the safe stop, and the hand's velocity begins again at zero; after
+      `max_failures` in a row the controller stops, and says why in `reason`.
+
+    Not to be shared between threads. `make_guiding` makes one.
+
+    Parameters
+    ----------
+    steps : sequence of AnyStep
+        One for each mode that can be engaged; the first one's is engaged at the beginning.
+    settings : GuidingSettings
+    dt : float
+        Control period [s].
+
+    Raises
+    ------
+    ValueError
+        When there are no steps, or two for one mode, or `dt` is no period.
+    """
+
+    def __init__(
+        self, steps: Sequence[AnyStep], settings: GuidingSettings | None = None, dt: float = DEFAULT_DT
+    ) -> None:
+        checked_modes([step.mode for step in steps])
+        self.robot: Final = steps[0].robot
+        self.settings: Final = settings or GuidingSettings()
+        self.dt: Final = checked_period(dt)
+        self._units: Final = {str(step.mode): GuidingUnit(step, self.settings, self.dt) for step in steps}
+        self._specs: Final[dict[str, Input]] = {}
+        for unit in self._units.values():
+            self._specs.update({given.name: given for given in unit.settable})
+        self._target: Array = np.array(self.robot.qd_max)
+        self.reset()
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes that can be engaged."""
+        return tuple(unit.mode for unit in self._units.values())
+
+    @property
+    def mode(self) -> Mode:
+        """The mode that is engaged."""
+        return self._unit.mode
+
+    @property
+    def phase(self) -> GuidingPhase:
+        """What it is doing."""
+        return self._phase
+
+    @property
+    def reason(self) -> str:
+        """Why it stopped; empty unless it did."""
+        return self._reason
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what `set` takes."""
+        return tuple(self._specs)
+
+    def reset(self) -> None:
+        """Begin again: at rest, with the first mode, anchored where the arm will be at the next tick."""
+        self._phase = GuidingPhase.GUIDING
+        self._reason = ""
+        self._failures = 0
+        self._stop_asked = False
+        self._qd: Array = np.zeros(self.robot.nv)
+        self._limit: Array = self._target.copy()
+        self._unit = next(iter(self._units.values()))
+        self._wanted: GuidingUnit | None = None
+        self._v: Array = np.zeros(self._unit.mode.m_free)
+        self._anchor: Array | None = None
+
+    def engage(self, mode: str | Mode) -> None:
+        """Ask for a mode: the tool is brought to rest, then anchored; the same mode again anchors it anew.
+
+        Raises
+        ------
+        ValueError
+            When it is none of `modes`.
+        """
+        name = str(checked_modes([mode])[0])
+        if name not in self._units:
+            raise ValueError(f"mode: expected one of {', '.join(self._units)}, got {name!r}")
+        self._wanted = self._units[name]
+        if self._phase is GuidingPhase.GUIDING:
+            self._phase = GuidingPhase.STOPPING
+
+    def stop(self, reason: str = "asked to") -> None:
+        """Bring the arm to rest, and stay there until `resume`."""
+        self._stop_asked = True
+        self._reason = reason
+        if self._phase is GuidingPhase.GUIDING:
+            self._phase = GuidingPhase.STOPPING
+
+    def resume(self) -> None:
+        """Let the hand guide again, once the arm is at rest, anchored where it then is."""
+        if self._stop_asked:
+            self._stop_asked = False
+            self._reason = ""
+            self._failures = 0
+            self._wanted = self._wanted or self._unit
+            self._phase = GuidingPhase.STOPPING
+
+    def set(self, **inputs: ArrayLike) -> None:
+        """Change limits, weights, settings, by name (`inputs`), from the next tick on.
+
+        Raises
+        ------
+        InputError
+            Naming the input that is unknown, of the wrong shape, not finite or out of range; then nothing is changed.
+        """
+        checked: dict[str, Array] = {}
+        for name, value in inputs.items():
+            if name not in self._specs:
+                raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
+            spec = self._specs[name]
+            checked[name] = np.broadcast_to(check_input(spec, value, self.mode), (spec.size,)).copy()
+        for unit in self._units.values():
+            unit.check(checked)
+        for name, values in checked.items():
+            if name == "qd_max":
+                self._target = values
+            for unit in self._units.values():
+                unit.set(name, values)
+
+    def __call__(self, q: ArrayLike, wrench: ArrayLike) -> GuidingResult:
+        """Compute the command of one control cycle.
+
+        Parameters
+        ----------
+        q : array_like, shape (nv,)
+            Joint positions [rad or m].
+        wrench : array_like, shape (6,)
+            Force and torque of the hand on the tool at the tool centre point, world axes [N, N m].
+
+        Raises
+        ------
+        InputError
+            Naming the one that has the wrong shape or is not finite.
+        """
+        position = checked_array("q", q, self.robot.nv)
+        pull = checked_array("wrench", wrench, 6)
+        if self._anchor is None:
+            self._anchor = self._unit.anchor_at(position)
+        if self._phase is not GuidingPhase.GUIDING and not self._v.any():
+            return self._come_to_rest(position, pull)
+        stopping = self._phase is GuidingPhase.STOPPING
+        asked = self._unit.ask(position, pull, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
+        self._limit = asked.qd_limit
+        tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._qd)
+        # Limits that leave no way back to the anchor must not keep the hand from moving.
+        yielded = tick.status is not Status.SOLVED and bool(asked.v_fixed.any())
+        if yielded:
+            tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._qd)
+        self._v = asked.v
+        self._failures = 0 if tick.status is Status.SOLVED else self._failures + 1
+        if self._failures:
+            self._v = np.zeros_like(asked.v)
+        if self._failures == self.settings.max_failures:
+            self.stop(f"{self._failures} ticks in a row were not solved, the last one: {tick.status.value}")
+        self._qd = tick.qd
+        return self._result(asked.v, asked.v + tick.eps, tick, asked.drift, yielded=yielded)
+
+    def _come_to_rest(self, q: Array, pull: Array) -> GuidingResult:
+        """Bring what still moves to rest, then do what was asked for: nothing is asked of the tool any more."""
+        assert self._anchor is not None, "anchored at the first tick"  # noqa: S101  # for mypy
+        asked = self._unit.ask(q, pull, self._v, self._anchor, self._qd, self._limit, stopping=True)
+        self._limit = asked.qd_limit
+        self._qd = self._unit.brake(q, self._qd, self._limit)
+        done = self._unit
+        if not self._qd.any():
+            if self._stop_asked:
+                self._phase = GuidingPhase.STOPPED
+            else:
+                self._unit = self._wanted or self._unit
+                self._wanted = None
+                self._phase = GuidingPhase.GUIDING
+                self._v = np.zeros(self._unit.mode.m_free)
+                self._anchor = self._unit.anchor_at(q)
+        zero = np.zeros(done.mode.m_free)
+        actual = zero if not self._qd.any() else done.guided_velocity(q, self._qd)
+        return GuidingResult(
+            self._qd, zero, actual, Status.SOLVED, 0, (), done.mode, self._phase, asked.drift, yielded=False
+        )
+
+    def _result(self, v: Array, v_actual: Array, tick: Command, drift: Array, *, yielded: bool) -> GuidingResult:
+        return GuidingResult(
+            tick.qd, v, v_actual, tick.status, tick.iterations, tick.active, self.mode, self._phase, drift, yielded
+        )
