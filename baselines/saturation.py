@@ -117,8 +117,8 @@ def saturate(problem: Problem) -> Level:
         if not (over > 0.0).any():
             return Level(a + b, 1.0, held, iteration)
         low, high = _fitting_scales(a, b, p, chosen)
-        least = max(0.0, float(np.max(low)))
-        most = min(1.0, float(np.min(high)))
+        least = max(0.0, float(low.max()))
+        most = min(1.0, float(high.min()))
         if least <= most and most > best.scale:
             at_bound = held + np.where(chosen | (high > most), 0.0, np.where(a > 0.0, 1.0, -1.0))
             best = Level(b + most * a, most, at_bound, iteration)
@@ -136,8 +136,8 @@ def _fitting_scales(a: Array, b: Array, p: Problem, chosen: NDArray[np.bool_]) -
     """Smallest and largest s, joint by joint, with b + s a within bounds; an empty interval where there is none."""
     moving = np.abs(a) > OVER
     slope = np.where(moving, a, 1.0)
-    ends = np.stack(((p.lower - b) / slope, (p.upper - b) / slope))
+    one, other = (p.lower - b) / slope, (p.upper - b) / slope
     inside = (b <= p.upper + OVER) & (b >= p.lower - OVER)
-    low = np.where(moving, ends.min(axis=0), np.where(inside, -np.inf, np.inf))
-    high = np.where(moving, ends.max(axis=0), np.where(inside, np.inf, -np.inf))
+    low = np.where(moving, np.minimum(one, other), np.where(inside, -np.inf, np.inf))
+    high = np.where(moving, np.maximum(one, other), np.where(inside, np.inf, -np.inf))
     return np.where(chosen, -np.inf, low), np.where(chosen, np.inf, high)

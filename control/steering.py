@@ -31,8 +31,11 @@ _RELAX: Final = 0.2
 _TAKE_UP: Final = 0.15
 _SETTLE: Final = 0.10
 _REACHED: Final = 5e-3
-# An attempt that got less far than this since the last stop was on the wrong side [m].
+# An attempt that got less far than this beyond where it backed off from was on the wrong side, or not wide enough [m];
+# then the step to the side grows by the factor, up to so many times what it was.
 _PROGRESS: Final = 0.02
+_WIDER: Final = 1.5
+_WIDEST: Final = 3.0
 
 
 class Doing(Enum):
@@ -58,7 +61,8 @@ class Steering:
 
     The side is one of four (inside and outside of the path's curve, and to both sides of its plane), in an order that
     is drawn; it begins, with probability `knows_side`, with the one that is nearest to the person. A side is kept as
-    long as it brings the hand forward from stop to stop; otherwise it is the next one's turn.
+    long as it brings the hand forward from stop to stop; otherwise it is the next one's turn, by a step half as wide
+    again (three times as wide at most).
 
     Parameters
     ----------
@@ -94,7 +98,9 @@ class Steering:
         self._still_since: float | None = None
         self._since = self._began = 0.0
         self._turn = 0
-        self._last_stop = -np.inf
+        self._width = 1.0
+        self._tried = False
+        self._from = 0.0
         self._goal: Array = np.zeros(3)
 
     def feel(self, t: float, speed: float, force: float, s: float) -> None:
@@ -108,9 +114,10 @@ class Steering:
             if self._still_since is not None and t - self._still_since >= c.reaction_time:
                 self._switch(Doing.PUSHING, t)
                 self.stops += 1
-                if s < self._last_stop + _PROGRESS:
+                if self._tried and s < self._from + _PROGRESS:
                     self._turn += 1
-                self._last_stop = s
+                    self._width = min(_WIDER * self._width, _WIDEST)
+                self._tried = False
         elif self.doing is Doing.PUSHING and speed > _MOVING:
             self._switch(Doing.FOLLOWING, t)
 
@@ -121,7 +128,8 @@ class Steering:
     def back_off(self, t: float, position: Array, pull: Array, s: float) -> None:
         """Begin to back off from where the tool stands, shape (3,) [m], pulled along a unit vector, at arc length s."""
         c = self._character
-        self._goal = position - c.back_off * pull + c.side_step * self.side(s)
+        self._goal = position - c.back_off * pull + self._width * c.side_step * self.side(s)
+        self._tried, self._from = True, s
         self._switch(Doing.BACKING_OFF, t)
 
     def follow(self, dt: float, deviation: Array) -> None:

@@ -29,7 +29,7 @@ class Tremor:
     So no power lies outside the band, however long one listens, it does not depend on the control period, and the same
     seed gives the same noise. Frequencies are incommensurate: it does not repeat within a run.
 
-    Physiological tremor has its peak between 8 and 12 Hz (T. Novak, K. M. Newell, Neuroscience Letters 641 (2017), on
+    Physiological tremor has its peak between 8 and 12 Hz (T. Novak, K. M. Newell, Neuroscience Letters, 2017, on
     isometric force), almost independently of the force exerted (G. G. Sutton, K. Sykes, J. Physiology 191 (1967)).
 
     Parameters

@@ -99,6 +99,8 @@ class Robot:
             If `q` has the wrong shape or is not finite.
         """
         values, places = finite_vector("q", q, self.nv), self._places
+        if not len(places.continuous):
+            return values
         result = np.empty(self.model.nq)
         result[places.first[places.single]] = values[places.single]
         result[places.first[places.continuous]] = np.cos(values[places.continuous])
