@@ -93,6 +93,6 @@ def unforced_excess(
     peak = float(np.max(np.abs(commands[1] - commands[0]) / step))
     if peak <= 1.0 + OVER:
         return 0.0
-    sides = velocity_bounds("viable", *(ca.DM(each) for each in (q, *limits, dt)))
-    low, high = (np.array(side)[:, 0] for side in sides)
+    sides = velocity_bounds("viable", *(ca.SX(ca.DM(each)) for each in (q, *limits, dt)))
+    low, high = (np.array(ca.DM(side))[:, 0] for side in sides)
     return max(0.0, peak - max(1.0, least_acceleration(J_fixed, commands[0], low, high, step)))
