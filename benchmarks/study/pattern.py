@@ -95,6 +95,11 @@ def at_limit(run: GuidedRun, joint: int, q_min: float, q_max: float) -> NDArray[
     return on
 
 
+def _middle(values: Array) -> float:
+    """Median that occurred, as in the table of medians: of an even number, the lower of the two in the middle."""
+    return float(np.sort(values)[(len(values) - 1) // 2])
+
+
 def _slides(found: StudyResult, letter: str) -> Verdict:
     settings, run = found.settings, found.runs[letter]
     elbow = settings.elbow
@@ -103,14 +108,14 @@ def _slides(found: StudyResult, letter: str) -> Verdict:
     stops = values_of(found.trials, "stops", algorithm=letter)
     standing = values_of(found.trials, "standing", algorithm=letter)
     told = (
-        f"{np.count_nonzero(stops == 0)} of {len(stops)} trials without a stop; still for {np.median(standing):.2f} s "
+        f"{np.count_nonzero(stops == 0)} of {len(stops)} trials without a stop; still for {_middle(standing):.2f} s "
         "in the median trial"
     )
     if not on.any():
         return Verdict(f"{letter}-slides", letter, expected, f"{told}; the elbow did not reach its limit", None)
     moving = float(np.mean(np.linalg.norm(run.twist[on, :3], axis=1) > _SLOW))
     measured = f"{told}; in the trial shown the tool moves during {100 * moving:.0f} % of the time at the limit"
-    holds = bool(np.median(stops) == 0.0) and moving >= _SLIDING
+    holds = _middle(stops) == 0.0 and moving >= _SLIDING
     return Verdict(f"{letter}-slides", letter, expected, measured, holds)
 
 
@@ -121,10 +126,10 @@ def _hard_stop(found: StudyResult) -> Verdict:
     peaks = values_of(found.trials, "elbow_peak_qdd", algorithm="A")
     measured = (
         f"in the trial shown {peak:.0f} rad/s² where the elbow moved with {speed:.3f} rad/s one period before: "
-        f"{share:.2f} v/dt; median of all trials {np.median(peaks):.0f} rad/s², {np.median(peaks) / limit:.0f} times "
+        f"{share:.2f} v/dt; median of all trials {_middle(peaks):.0f} rad/s², {_middle(peaks) / limit:.0f} times "
         "the limit"
     )
-    holds = _STOP_SHARE[0] <= share <= _STOP_SHARE[1] and bool(np.median(peaks) > limit)
+    holds = _STOP_SHARE[0] <= share <= _STOP_SHARE[1] and _middle(peaks) > limit
     return Verdict("A-peaks", "A", "A stops hard: its elbow acceleration peaks at about v/dt", measured, holds)
 
 
@@ -155,10 +160,10 @@ def _freezes(trials: pl.DataFrame) -> Verdict:
     standing = values_of(trials, "standing", algorithm="B")
     others = values_of(trials.filter(pl.col("algorithm") != "B"), "standing")
     measured = (
-        f"{np.count_nonzero(stops > 0)} of {len(stops)} trials with a stop, {np.median(stops):g} in the median trial; "
-        f"still for {np.median(standing):.2f} s in the median trial (A and C: {np.median(others):.2f} s)"
+        f"{np.count_nonzero(stops > 0)} of {len(stops)} trials with a stop, {_middle(stops):g} in the median trial; "
+        f"still for {_middle(standing):.2f} s in the median trial (A and C: {_middle(others):.2f} s)"
     )
-    holds = bool(np.median(stops) >= 1.0 and np.median(standing) > np.median(others))
+    holds = _middle(stops) >= 1.0 and _middle(standing) > _middle(others)
     return Verdict(
         "B-freezes", "B", "B freezes at the limit: the arm stands still while the hand pulls", measured, holds
     )
@@ -185,7 +190,7 @@ def _gentler(trials: pl.DataFrame) -> Verdict:
         key: {letter: float(np.median(values)) for letter, values in operator_medians(trials, key).items()}
         for key in ("peak_qdd", "peak_torque", "peak_torque_rate")
     }
-    measured = "medians of A, B and C, peaks over joints: " + "; ".join(
+    measured = "medians over operators of A, B and C, peaks over joints: " + "; ".join(
         ", ".join(number(by[letter]) for letter in "ABC") + f" {unit}"
         for by, unit in zip(medians.values(), ("rad/s²", "Nm", "Nm/s"), strict=True)
     )

@@ -31,6 +31,13 @@ def test_an_operator_counts_once() -> None:
     assert found["B"].tolist() == [101.0, 111.0, 121.0, 131.0]
 
 
+def test_rounding_is_no_difference() -> None:
+    same = TRIALS.with_columns(time=pl.when(pl.col("algorithm") == "A").then(10.0).otherwise(10.0 + 1e-10))
+    found = operator_medians(same, "time")
+    assert median_test(found).statistic is None
+    assert operator_medians(same.with_columns(pl.col("time") * 1.001), "time")["A"].tolist() == [10.01] * 4
+
+
 def test_medians_with_intervals(study: StudyResult) -> None:
     found = {one.outcome.key: one.by for one in medians(study.trials)}
     assert set(found) == {one.key for one in OUTCOMES}
