@@ -99,9 +99,9 @@ class CompiledGuiding:
     def _settable(self, code: Any) -> dict[str, tuple[Input, Array]]:
         """Inputs that can be set, with where they stand."""
         law = GuidingLaw(self.robot, self.modes[0], self.settings)
-        inputs = {given.name: given for mode in code.modes for given in mode.inputs} | {
-            given.name: given for given in law.settable
-        }
+        # The structs have room for the mode with most entries, and the values of one mode are those of all.
+        by_size = sorted((given for mode in code.modes for given in mode.inputs), key=lambda given: given.size)
+        inputs = {given.name: given for given in (*by_size, *law.settable)}
         of_step = {field.name for field in code.parameters} - {"dt", "qdd_prev"}
         found = {}
         for name, given in inputs.items():
@@ -111,7 +111,7 @@ class CompiledGuiding:
         return found
 
     def _view(self, struct: Any, name: str) -> Array:
-        address = self._ffi.addressof(struct if not isinstance(struct, tuple) else struct[0], name)
+        address = self._ffi.addressof(struct, name)
         size = self._ffi.sizeof(self._ffi.typeof(address).item)
         return np.frombuffer(self._ffi.buffer(address, size), dtype=np.float64)
 
@@ -165,7 +165,11 @@ class CompiledGuiding:
         self._reason = ""
 
     def set(self, **inputs: ArrayLike) -> None:
-        """As `GuidingController.set`, in all modes at once."""
+        """As `GuidingController.set`, in all modes at once.
+
+        What has an entry for each guided row (`task_weight`) is given for the mode that has most of them; others take its
+        first entries.
+        """
         values: list[tuple[Array, Array]] = []
         for name, value in inputs.items():
             if name not in self._specs:
