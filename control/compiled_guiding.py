@@ -167,8 +167,8 @@ class CompiledGuiding:
     def set(self, **inputs: ArrayLike) -> None:
         """As `GuidingController.set`, in all modes at once.
 
-        What has an entry for each guided row (`task_weight`) is given for the mode that has most of them; others take the
-        first ones.
+        What has an entry for each guided row (`task_weight`) is given for the mode that has most of them; others take
+        the first ones.
         """
         values: list[tuple[Array, Array]] = []
         for name, value in inputs.items():
