@@ -155,8 +155,8 @@ def simulate(
     Parameters
     ----------
     step : Step
-        The controller; `dt` is handed to it at every tick, and the last command as `qd_prev` where it takes one (the
-        arm starts at rest).
+        The controller; `dt` is handed to it at every tick and, where it takes them, the last command as `qd_prev` and
+        its difference from the one before over `dt` as `qdd_prev` (the arm starts at rest).
     guide : Guide
         Gives the twist asked for.
     q0 : array_like, shape (nv,)
@@ -184,17 +184,19 @@ def simulate(
         raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
     free = list(step.mode.free_rows)
     q = np.array(q0, dtype=float)
-    remembers = "qd_prev" in step.inputs
+    memory = {name: np.zeros(step.robot.nv) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
     qd = np.zeros(step.robot.nv)
     states, twists, positions, results = [], [], [], []
     for tick in range(ticks):
         pose = step.robot.pose(q)
         v = (step.mode.twist_map_at(pose) @ guide.twist(tick * dt, pose))[free]
-        result = step(q, v, dt=dt, **({"qd_prev": qd} if remembers else {}))
+        result = step(q, v, dt=dt, **memory)
         states.append(q)
         twists.append(v)
         positions.append(pose[:3, 3])
         results.append(result)
+        now = {"qd_prev": result.qd, "qdd_prev": (result.qd - qd) / dt}
+        memory = {name: now[name] for name in memory}
         qd = result.qd
         q = q + dt * qd
         if on_tick is not None:

@@ -23,8 +23,11 @@ LEAST_SOLVED = {"thesis-active-set": 0.25, "clarabel": 0.8, "piqp": 0.75, "casad
 # Where the task is an equality too, rows are dependent at every singularity, not at those of the locked rows alone.
 # The upper level of a hierarchy is flat besides.
 # Split into two directions, a joint at rest is on both of their bounds at once.
+# With a limit of jerk every joint has four rows of its own, with two slacks that enter many of them.
 LEAST_SOLVED_BY_FORMULATION = {
+    ("cartesian-error-robust", "casadi-qrqp"): 0.5,
     ("hierarchical", "casadi-qrqp"): 0.05,
+    ("joint-space-robust", "casadi-qrqp"): 0.5,
     ("minimum-kinetic-energy", "casadi-qrqp"): 0.6,
     ("minimum-velocity-norm", "casadi-qrqp"): 0.6,
     ("task-scaling", "casadi-qrqp"): 0.6,
