@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
+import os
 import re
+import shlex
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,11 +21,21 @@ import pytest
 from kinqp.control import make_step
 from kinqp.formulations import viable_bound, with_constraints
 from kinqp.solvers import Status
+from kinqp.solvers.native import compiler
 
 if TYPE_CHECKING:
     from types import ModuleType
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@functools.cache
+def quick_compiler() -> str:
+    """A command that compiles with less optimisation: the bits do not depend on it, the time to compile does."""
+    script = Path(tempfile.mkdtemp()) / "cc"
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(compiler())} "$@" -O0\n', encoding="utf-8")
+    script.chmod(0o755)
+    return str(script)
 
 
 def run(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -32,6 +46,7 @@ def run(script: str, *arguments: str) -> subprocess.CompletedProcess[str]:
         text=True,
         check=False,
         timeout=900,
+        env=os.environ | {"KINQP_CC": quick_compiler()},
     )
 
 
