@@ -117,6 +117,7 @@ def test_ctrl_c_keeps_the_cells_done(tmp_path: Path) -> None:
     assert len(list(out.glob("ticks/*.parquet"))) == 4
 
 
+@pytest.mark.long
 def test_kill_minus_nine_three_times_loses_at_most_what_was_being_run(tmp_path: Path) -> None:
     path, out = tmp_path / "sweep.toml", tmp_path / "out"
     path.write_text(TINY)

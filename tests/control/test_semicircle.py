@@ -10,9 +10,9 @@ from kinqp.control import Trajectory, make_step, simulate
 from kinqp.solvers import Status
 
 ELBOW = 3
-CASES = [
-    (f, s) for f in ("cartesian-error", "joint-space") for s in ("active-set", "thesis-active-set", "clarabel", "piqp")
-]
+FORMULATIONS = ("cartesian-error", "joint-space")
+CASES = [(f, s) for f in FORMULATIONS for s in ("active-set", "clarabel")]
+CASES += [pytest.param(f, s, marks=pytest.mark.long) for f in FORMULATIONS for s in ("thesis-active-set", "piqp")]
 
 
 @cache
@@ -96,7 +96,7 @@ def test_arm_never_stops_while_the_hand_pulls_along_the_limit(formulation: str, 
 
 
 @pytest.mark.parametrize("formulation", ["cartesian-error", "joint-space"])
-@pytest.mark.parametrize("solver", ["active-set", "clarabel", "piqp"])
+@pytest.mark.parametrize("solver", ["active-set", "clarabel", pytest.param("piqp", marks=pytest.mark.long)])
 def test_solvers_give_the_same_commands(formulation: str, solver: str) -> None:
     reference = run(formulation, "thesis-active-set")
     # PIQP stops on a duality gap of 1e-9, which leaves 2e-5 rad/s where a row is on the verge of becoming active.

@@ -14,7 +14,7 @@ from tests.control.states import states
 from tests.formulations.reference import memory, needs_masses
 
 MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,1,0", "rcm:0.1")
-STATES_PER_CASE = 24
+STATES_PER_CASE = 12
 SPEEDS = (1e-6, 0.01, 0.2, 2.0)
 
 # The least share of states that must be solved: interior-point solvers lose digits where locked rows become
