@@ -110,9 +110,7 @@ def test_the_same_matrix_has_the_same_letter() -> None:
     assert "| $A_{1}$ | one, factor of qd; -other, factor of qd | 2 x 7 | change every tick |" in text
 
 
-@pytest.mark.parametrize(
-    "mode", [*MODES[:2], *(pytest.param(mode, marks=pytest.mark.long) for mode in MODES[2:])]
-)
+@pytest.mark.parametrize("mode", [*MODES[:2], *(pytest.param(mode, marks=pytest.mark.long) for mode in MODES[2:])])
 @pytest.mark.parametrize("formulation", ONE_QP)
 def test_every_row_is_listed_once(formulation: str, mode: str) -> None:
     text = get_formulation(formulation).describe(arm("ur5e"), mode)
