@@ -15,7 +15,6 @@ from kinqp.benchmarks.worst_case.timing import Stopwatch
 from kinqp.cli.app import app
 from kinqp.codegen import CompiledStep, compile_step
 from kinqp.robots import load_robot
-from tests.codegen.compiled import compiled
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -102,7 +101,7 @@ def test_a_case_is_shown_again_from_its_file(found: WorstCase, tmp_path: Path) -
 
 
 def test_last_commands_are_searched_where_they_count() -> None:
-    robust = compiled("lbr_med14", "joint-space-robust", "fix-orientation", quick=True)
+    robust = compile_step(load_robot("lbr_med14"), "joint-space-robust", "fix-orientation")
     most = search(robust, ticks=20_000, seed=0).most
     result = robust(most.q, most.v, **{name: np.array(x) for name, x in most.limits.items()}, qd_prev=most.qd_prev)
     assert result.iterations == most.iterations
