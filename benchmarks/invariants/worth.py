@@ -106,7 +106,9 @@ def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:
     scale = max(abs(0.5 * float(y @ qp.H @ y)) + abs(float(qp.g @ y)) for y in (x, there))
     # What constants a cost has is not known here: at its minimum it may be all but zero in what is left.
     scale += float(np.abs(slope).sum()) * size + TOLERANCE * float(np.abs(qp.H).max()) * size * size
-    return max(float(told.max()), float(missed.max(initial=0.0))), max(difference, 0.0) / scale
+    # Where nothing is asked and nothing costs, both are zero.
+    above = difference / scale if difference > 0.0 else 0.0
+    return max(float(told.max()), float(missed.max(initial=0.0))), above
 
 
 def _least(matrix: Array, wanted: Array, enough: float) -> tuple[Array, Array]:

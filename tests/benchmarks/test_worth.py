@@ -39,6 +39,11 @@ def test_a_direction_that_costs_nothing_is_free() -> None:
     assert above == pytest.approx(1.0, rel=1e-6)
 
 
+def test_where_nothing_is_asked_and_nothing_costs() -> None:
+    idle = instance(QP(H=np.zeros((1, 1)), g=[0.0], lb=[-1.0], ub=[1.0]), [[1.0]])
+    assert worth(idle, np.zeros(1), np.zeros(1)) == (0.0, 0.0)
+
+
 def test_the_error_that_goes_with_a_command_is_recovered() -> None:
     # eps = qd - 1, cost 1/2 eps^2, |qd| <= 0.5: at best qd = 0.5.
     qp = QP(H=np.diag([1.0, 0.0]), g=[0.0, 0.0], A=[[1.0, -1.0]], b=[-1.0], lb=[-np.inf, -0.5], ub=[np.inf, 0.5])
