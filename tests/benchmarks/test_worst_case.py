@@ -100,6 +100,7 @@ def test_a_case_is_shown_again_from_its_file(found: WorstCase, tmp_path: Path) -
     assert (again.slowest.iterations, again.slowest.q) == (found.slowest.iterations, found.slowest.q)
 
 
+@pytest.mark.long
 def test_last_commands_are_searched_where_they_count() -> None:
     robust = compile_step(load_robot("lbr_med14"), "joint-space-robust", "fix-orientation")
     most = search(robust, ticks=20_000, seed=0).most
