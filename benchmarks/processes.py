@@ -25,7 +25,7 @@ _PREPARE_TIMEOUT: Final = 600.0
 # A process that dies is not always the cell's fault: the machine may have wanted its memory. Once more, then it is.
 ATTEMPTS: Final = 2
 # A single-threaded process is what is measured, and what two of them beside each other don't fight over.
-_THREADS: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+ONE_THREAD: Final = dict.fromkeys(("OMP_NUMONE_THREAD", "OPENBLAS_NUMONE_THREAD", "MKL_NUMONE_THREAD"), "1")
 
 
 class WorkerDiedError(RuntimeError):
@@ -167,7 +167,7 @@ class Worker:
         # -P: the folder that the module happens to be run from must not come first among those to import from.
         command = [sys.executable, "-P", "-m", "kinqp.benchmarks.worker", str(theirs.fileno())]
         self._process = subprocess.Popen(
-            command, pass_fds=(theirs.fileno(),), env=os.environ | _THREADS, stdin=subprocess.DEVNULL,
+            command, pass_fds=(theirs.fileno(),), env=os.environ | ONE_THREAD, stdin=subprocess.DEVNULL,
             # Ctrl-C is the parent's to handle.
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
         )  # fmt: skip

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from .loop import AnyStep, Command
+    from .loop import AnyStep
 
     Array = NDArray[np.float64]
 
@@ -216,7 +216,18 @@ class GuidingController:
         if self._failures == self.settings.max_failures:
             self.stop(f"{self._failures} ticks in a row were not solved, the last one: {tick.status.value}")
         self._remember(tick.qd)
-        return self._result(asked.v, asked.v + tick.eps, tick, asked.drift, yielded=yielded)
+        return GuidingResult(
+            tick.qd,
+            asked.v,
+            asked.v + tick.eps,
+            tick.status,
+            tick.iterations,
+            tick.active,
+            self.mode,
+            self._phase,
+            asked.drift,
+            yielded,
+        )
 
     def _come_to_rest(self, q: Array, pull: Array) -> GuidingResult:
         """Bring what still moves to rest, then do what was asked for: nothing is asked of the tool any more."""
@@ -243,8 +254,3 @@ class GuidingController:
     def _remember(self, qd: Array) -> None:
         self._qdd = (qd - self._qd) / self.dt
         self._qd = qd
-
-    def _result(self, v: Array, v_actual: Array, tick: Command, drift: Array, *, yielded: bool) -> GuidingResult:
-        return GuidingResult(
-            tick.qd, v, v_actual, tick.status, tick.iterations, tick.active, self.mode, self._phase, drift, yielded
-        )

@@ -14,6 +14,7 @@ from ...control import InterpretedStep
 from ...formulations import Mode, get_formulation
 from ...robots import load_robot
 from ...solvers import get_solver
+from ..store import write_whole
 from ..worst_case.case import CaseError
 from .agreement import Agreement, compare
 from .cone import rounded
@@ -188,9 +189,7 @@ def attained_again(found: Certificates) -> list[tuple[int, int]]:
 def write_certificates(found: Certificates, path: Path) -> None:
     """Write as JSON, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    partial.write_text(json.dumps({"kind": _KIND, **asdict(found)}, indent=1) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_whole(path, (json.dumps({"kind": _KIND, **asdict(found)}, indent=1) + "\n").encode())
 
 
 def read_certificates(path: Path) -> Certificates:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import polars as pl
 
+from ..processes import ONE_THREAD
 from ..store import write_whole
 from .outcomes import joint_torques
 from .plan import Course, Trial, trials_of
@@ -21,9 +22,6 @@ from .result import TRIAL_COLUMNS, StudyError, StudyResult, StudySettings
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
-
-# Workers are what runs beside each other; threads of linear algebra within them would only fight over the cores.
-_THREADS: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def run_study(
@@ -136,7 +134,7 @@ class _Worker:
         # Ctrl-C is the parent's to handle: hence a session of its own.
         self._process: Final = subprocess.Popen(
             [sys.executable, "-P", "-m", "kinqp.benchmarks.study.worker", str(folder)],
-            env=os.environ | _THREADS, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            env=os.environ | ONE_THREAD, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             text=True, start_new_session=True,
         )  # fmt: skip
 

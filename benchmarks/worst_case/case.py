@@ -10,6 +10,7 @@ import numpy as np
 
 from ...codegen import compile_step
 from ...robots import load_robot
+from ..store import write_whole
 from .states import Batch, Draws
 from .timing import Stopwatch
 
@@ -132,9 +133,7 @@ class Replayed:
 def write_case(case: WorstCase, path: Path) -> None:
     """Write a case as JSON, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.with_name(f"{path.name}.partial")
-    partial.write_text(json.dumps({"kind": _KIND, **asdict(case)}, indent=1) + "\n", encoding="utf-8")
-    partial.replace(path)
+    write_whole(path, (json.dumps({"kind": _KIND, **asdict(case)}, indent=1) + "\n").encode())
 
 
 def read_case(path: Path) -> WorstCase:
