@@ -15,6 +15,7 @@ from .make_guiding import make_guiding
 from .operator import Operator
 from .paths import Path, PathFollower, SemicirclePath
 from .point_path import PointPath, solve_points
+from .position_observer import PositionObserver
 from .posture import relax
 from .push import Push
 from .spiral import SpiralPath
@@ -49,6 +50,7 @@ __all__ = [
     "Path",
     "PathFollower",
     "PointPath",
+    "PositionObserver",
     "Push",
     "SemicirclePath",
     "SpiralPath",

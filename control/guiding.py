@@ -33,6 +33,7 @@ class GuidingController:
       it gives way for that tick, and the locked rows stay where they are.
     - Joint velocity limits may be changed at any time: they take effect no faster than the acceleration limits let a
       joint follow.
+    - Joint positions can be those of an observer (`observer_gain`), which keeps the encoders' noise out.
     - A tick whose QP is not solved sends the safe stop, and the hand's velocity begins again at zero; after
       `max_failures` in a row the controller stops, and says why in `reason`.
 
@@ -103,6 +104,7 @@ class GuidingController:
         self._wanted: GuidingUnit | None = None
         self._v: Array = np.zeros(self._unit.mode.m_free)
         self._anchor: Array | None = None
+        self._position: Array | None = None
 
     def engage(self, mode: str | Mode) -> None:
         """Ask for a mode: the tool is brought to rest, then anchored; the same mode again anchors it anew.
@@ -195,8 +197,10 @@ class GuidingController:
         InputError
             Naming the one that has the wrong shape or is not finite.
         """
-        position = checked_array("q", q, self.robot.nv)
+        measured = checked_array("q", q, self.robot.nv)
         pull = checked_array("wrench", wrench, 6)
+        position = self._unit.observe(measured, measured if self._position is None else self._position, self._qd)
+        self._position = position
         if self._anchor is None:
             self._anchor = self._unit.anchor_at(position)
         if self._phase is not GuidingPhase.GUIDING and not self._v.any():

@@ -32,6 +32,8 @@ _COMMENTS: Final = {
     "drift_turn_dead_zone": "angle that it leaves alone",
     "stop_deceleration": "what a tool that is brought to rest loses beyond what friction takes",
     "stop_turn_deceleration": "the same of its rotation",
+    "observer_gain": "what a measured position counts for; from 1 up: no observer",
+    "observer_jump": "a measurement this far from what is expected is believed at once",
     "limit_share": "share of the acceleration limits with which changed velocity limits take effect",
 }
 
@@ -98,6 +100,7 @@ def render_guiding(
         "drift": any(field.name == "v_fixed" for field in code.inputs),
         "previous": any(field.name == "qd_prev" for field in code.inputs),
         "change": "qdd_prev" in own,
+        "observe": _statements(laws[0], laws[0].observed, sources | {"q": "q"}),
         "anchor": _statements(laws[0], laws[0].anchor, sources | {"q": "q"}),
         "brake": _statements(laws[0], laws[0].brake, sources | {"q": "q"}),
         "modes": [

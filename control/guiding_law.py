@@ -12,6 +12,7 @@ from ..formulations.acceleration_bounds import braking
 from ..formulations.bounds import velocity_bounds
 from .admittance import admit, outside_dead_zone, slowed, wrench_along
 from .drift import correction, pose_error
+from .position_observer import observed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from .guiding_settings import GuidingSettings
 
 #: What the controller itself hands to the law at every tick; all other inputs of a law are settings or limits.
-HANDED: Final = ("q", "wrench", "hand_velocity", "anchor", "qd_prev", "qd_limit", "stopping")
+HANDED: Final = ("q", "wrench", "hand_velocity", "anchor", "qd_prev", "qd_limit", "stopping", "q_observed")
 
 
 class GuidingLaw:
@@ -42,6 +43,9 @@ class GuidingLaw:
         `v`, shape (m_free, 1): velocity asked for, by admittance, or on its way to zero while `stopping`;
         `v_fixed`, (m_fixed, 1): drift compensation; `qd_limit`, (nv, 1): joint velocity limits of this tick, on their
         way to `qd_max`; `drift`, (2, 1): distance and angle of the locked rows from the anchor [m, rad].
+    observed : dict of str to ca.SX
+        `observed`, (nv, 1): joint positions by the observer, from `q` as measured and the last ones, `q_observed`. What
+        is called `q` in all others is this.
     anchor : dict of str to ca.SX
         `anchor`, (12, 1): rotation and position at `q`, column by column.
     guided : dict of str to ca.SX
@@ -59,6 +63,7 @@ class GuidingLaw:
         # First of all, so that inputs come in one order whatever a mode makes use of.
         _ = tick.q, tick.qd_prev, tick.dt, tick.qd_max, tick.qdd_max
         self.law: Final = self._declare()
+        self.observed: Final = {"observed": self._observe()}
         self.anchor: Final = {"anchor": ca.vec(tick.pose[:3, :])}
         bounds = velocity_bounds("viable", tick.q, tick.q_min, tick.q_max, self._qd_limit, tick.qdd_max, tick.dt)
         self.guided: Final = {"v": tick.J_free @ tick.qd_prev}
@@ -94,6 +99,13 @@ class GuidingLaw:
         step = self._setting("limit_share", "-", positive=True) * tick.qdd_max * tick.dt
         down = ca.fmax(tick.qd_max, ca.fmin(last, ca.fabs(tick.qd_prev)) - step)
         return ca.if_else(tick.qd_max < last, down, ca.fmin(tick.qd_max, last + step))
+
+    def _observe(self) -> ca.SX:
+        tick = self._tick
+        last = tick.parameter("q_observed", None, size=tick.nv, unit="rad or m")
+        gain = self._setting("observer_gain", "-", positive=True)
+        jump = self._setting("observer_jump", "rad or m", positive=True)
+        return observed(tick.q, last, tick.qd_prev, gain, jump, tick.dt)
 
     def _declare(self) -> dict[str, ca.SX]:
         tick, mode = self._tick, self.mode

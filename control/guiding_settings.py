@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .position_observer import JUMP
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
@@ -38,6 +40,9 @@ class GuidingSettings:
     limit_share : float
         Share of the acceleration limits with which changed velocity limits take effect: joints that the locked rows
         couple to one that is braked change faster than it does [-].
+    observer_gain, observer_jump : float
+        Of the observer of joint positions (`PositionObserver`): what a measurement counts for, above 0 [-]; with 1 or
+        more there is no observer. A measurement further than this from what is expected is believed at once [rad or m].
     max_failures : int
         So many ticks in a row whose QP is not solved end in a stop.
 
@@ -59,6 +64,8 @@ class GuidingSettings:
     stop_deceleration: float = 0.5
     stop_turn_deceleration: float = 2.0
     limit_share: float = 0.2
+    observer_gain: float = 1.0
+    observer_jump: float = JUMP
     max_failures: int = 20
 
     def __post_init__(self) -> None:
@@ -67,7 +74,7 @@ class GuidingSettings:
             if value.shape != (6,) or not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ValueError(f"{name}: expected 6 positive numbers, got {getattr(self, name)!r}")
             object.__setattr__(self, name, tuple(map(float, value)))
-        for name in ("stop_deceleration", "stop_turn_deceleration", "limit_share"):
+        for name in _POSITIVE:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise ValueError(f"{name}: expected a positive number, got {getattr(self, name)!r}")
         for name in _NOT_NEGATIVE:
@@ -77,6 +84,10 @@ class GuidingSettings:
             raise ValueError(f"max_failures: expected a count of at least 1, got {self.max_failures!r}")
 
 
+_POSITIVE = (
+    *("stop_deceleration", "stop_turn_deceleration", "limit_share"),
+    *("observer_gain", "observer_jump"),
+)
 _NOT_NEGATIVE = (
     *("force_dead_zone", "torque_dead_zone", "drift_gain", "drift_speed", "drift_turn"),
     *("drift_dead_zone", "drift_turn_dead_zone"),

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..formulations import InputError
 from ..formulations.buffered import BufferedFunction
-from .guiding_law import HANDED, GuidingLaw
+from .guiding_law import GuidingLaw
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,6 +50,7 @@ class GuidingUnit:
         self.mode: Final = step.mode
         self._step: Final = step
         self._law: Final = BufferedFunction("law", law.symbols_of(law.law), law.law)
+        self._observed: Final = BufferedFunction("observed", law.symbols_of(law.observed), law.observed)
         self._anchor: Final = BufferedFunction("anchor", law.symbols_of(law.anchor), law.anchor)
         self._guided: Final = BufferedFunction("guided", law.symbols_of(law.guided), law.guided)
         self._brake: Final = BufferedFunction("brake", law.symbols_of(law.brake), law.brake)
@@ -90,6 +91,13 @@ class GuidingUnit:
         if name in self._own and name != "qd_max":
             self._extra[name] = values
 
+    def observe(self, measured: Array, last: Array, qd_prev: Array) -> Array:
+        """Joint positions of this tick, shape (nv,), from those of the last one."""
+        for name, values in (("q", measured), ("q_observed", last), ("qd_prev", qd_prev)):
+            self._observed.given[name][:] = values
+        self._observed()
+        return self._observed.results["observed"][:, 0].copy()
+
     def anchor_at(self, q: Array) -> Array:
         """Pose at `q`, shape (12,), as `ask` takes it."""
         self._anchor.given["q"][:] = q
@@ -109,8 +117,16 @@ class GuidingUnit:
     ) -> Asked:
         """Evaluate the law; arguments as in `GuidingLaw`."""
         given = self._law.given
-        handed = (q, wrench, v, anchor, qd_prev, qd_limit, np.array([float(stopping)]))
-        for name, values in zip(HANDED, handed, strict=True):
+        handed = {
+            "q": q,
+            "wrench": wrench,
+            "hand_velocity": v,
+            "anchor": anchor,
+            "qd_prev": qd_prev,
+            "qd_limit": qd_limit,
+            "stopping": np.array([float(stopping)]),
+        }
+        for name, values in handed.items():
             # Without locked rows there is no anchor in it.
             if name in given:
                 given[name][:] = values
@@ -148,7 +164,7 @@ class GuidingUnit:
         return self._guided.results["v"][:, 0].copy()
 
     def _put(self, name: str, values: Array) -> None:
-        for function in (self._law, self._brake):
+        for function in (self._law, self._brake, self._observed):
             if name in function.given:
                 function.given[name][:] = values
 
