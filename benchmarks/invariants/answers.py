@@ -31,7 +31,7 @@ MARGIN: Final = 1.001
 #: Cost above the best known, relative to the objective's two parts, at least 1 [m^2/s^2 at unit weights].
 COST_TOLERANCE: Final = 1e-6
 #: Inputs that tell of the ticks before, by the names they have in `StateSet`.
-MEMORY: Final = ("qd_prev", "qdd_prev")
+MEMORY: Final[tuple[str, ...]] = ("qd_prev", "qdd_prev")
 _ERROR_TOLERANCE: Final = 1e-9
 
 
