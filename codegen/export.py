@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 TICKS_PER_MODE: Final = 200
 TOLERANCE: Final = 1e-9
 _FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize")
+# Control period [s]: the default of `dt`.
+_PERIOD: Final = 1e-3
 # The hand moves this much per tick [m/s, rad/s]; fast, so that a short record meets limits.
 _HAND_SPEED: Final = 0.4
 
@@ -45,13 +47,16 @@ class ExportError(ValueError):
 
 @dataclass(frozen=True)
 class Recorded:
-    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free); qd_prev (N, nv) where it is an input."""
+    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free); start (N,), 1 where the arm was at rest.
+
+    Elsewhere the last command is that of the tick before, and the last acceleration what led to it.
+    """
 
     mode: NDArray[np.int64]
+    start: NDArray[np.int64]
     q: Array
     v: Array
     qd: Array
-    qd_prev: Array | None
 
 
 def export_c(
@@ -105,15 +110,19 @@ def export_c(
     files = render_step(code)
     recorded = record(robot, made, parsed)
     templates = environment()
+    previous = any(field.name == "qd_prev" for field in code.inputs)
+    change = any(field.name == "qdd_prev" for field in code.parameters)
     shared = {
         "p": prefix,
         "nv": code.nv,
         "m_free": code.m_free,
         "rows": code.rows,
-        "previous": recorded.qd_prev is not None,
+        "previous": previous,
+        "change": change,
+        "remembers": previous or change,
     }
     files["main.c"] = templates.get_template("main.c.j2").render(shared | {"tolerance": number(TOLERANCE)})
-    files["recorded.h"] = recorded_header(recorded, code)
+    files["recorded.h"] = recorded_header(recorded, code, remembers=previous or change)
     files["CMakeLists.txt"] = templates.get_template("CMakeLists.txt.j2").render(shared)
     files["README.md"] = templates.get_template("README.md.j2").render(
         shared
@@ -145,58 +154,56 @@ def export_c(
 def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Recorded:
     """Run every mode in closed loop through the interpreted path, from where every other joint is close to its limit.
 
-    Ticks whose answer the solver itself doesn't vouch for are left out.
+    Ticks whose answer the solver itself doesn't vouch for are left out; after one the arm is at rest again.
     """
     low = np.where(np.isfinite(robot.q_min), robot.q_min, -np.pi)
     high = np.where(np.isfinite(robot.q_max), robot.q_max, np.pi)
     rng = np.random.default_rng(0)
-    columns: list[tuple[int, Array, Array, Array, Array]] = []
-    needs_previous = False
+    columns: list[tuple[int, bool, Array, Array, Array]] = []
     for index, mode in enumerate(modes):
         levels = [Evaluator(lower(level, robot, mode)) for level in levels_of(formulation)]
-        needs_previous = any(given.name == "qd_prev" for level in levels for given in level.inputs)
         solver = get_solver("active-set", tolerance=1e-10)
         q = low + (0.25 + 0.5 * rng.random(robot.nv)) * (high - low)
         q[1::2] = high[1::2] - 1e-3  # several at once, so that the solver has something to do
-        qd = np.zeros(robot.nv)
+        start, qd, qdd = True, np.zeros(robot.nv), np.zeros(robot.nv)
         amplitude = _HAND_SPEED * rng.uniform(0.5, 1.0, mode.m_free)
         phase = rng.uniform(0.0, 2.0 * np.pi, mode.m_free)
         for tick in range(TICKS_PER_MODE):
             v = amplitude * np.sin(phase + 2.0 * np.pi * tick / TICKS_PER_MODE)
-            command, stop = _command(levels, solver, {"q": q, "v": v, "qd_prev": qd})
+            command = _command(levels, solver, {"q": q, "v": v, "qd_prev": qd, "qdd_prev": qdd})
             if command is None:
-                qd = stop
+                start, qd, qdd = True, np.zeros(robot.nv), np.zeros(robot.nv)
                 q = q + 1e-3 * rng.normal(size=robot.nv)
                 continue
-            before, qd = qd, command
-            columns.append((index, q, v, qd, before))
-            q = q + 1e-3 * qd
+            columns.append((index, start, q, v, command))
+            start, qd, qdd = False, command, (command - qd) / _PERIOD
+            q = q + _PERIOD * qd
     if not columns:
         raise ExportError(f"{formulation.name} on {robot.name}: expected ticks that can be solved, got none")
     widest = max(mode.m_free for mode in modes)
     return Recorded(
         np.array([index for index, *_ in columns]),
-        np.array([q for _, q, _, _, _ in columns]),
-        np.array([np.pad(v, (0, widest - len(v))) for _, _, v, _, _ in columns]),
-        np.array([qd for _, _, _, qd, _ in columns]),
-        np.array([before for *_, before in columns]) if needs_previous else None,
+        np.array([int(start) for _, start, *_ in columns]),
+        np.array([q for _, _, q, _, _ in columns]),
+        np.array([np.pad(v, (0, widest - len(v))) for *_, v, _ in columns]),
+        np.array([qd for *_, qd in columns]),
     )
 
 
-def _command(levels: Sequence[Evaluator], solver: Solver, given: dict[str, Array]) -> tuple[Array | None, Array]:
-    """Command and safe stop at a state; no command where a level is not solved."""
+def _command(levels: Sequence[Evaluator], solver: Solver, given: dict[str, Array]) -> Array | None:
+    """Command at a state; none where a level is not solved."""
     for evaluate in levels:
         names = {each.name for each in evaluate.inputs}
         instance = evaluate(**{name: value for name, value in given.items() if name in names})
         solution = solver.solve(instance.qp)
         if not solution.solved:
-            return None, instance.stop
+            return None
         given = given | {ABOVE: instance.K @ solution.x + instance.k}
-    return given[ABOVE], instance.stop
+    return given[ABOVE]
 
 
-def recorded_header(recorded: Recorded, code: StepCode) -> str:
-    """Write recorded ticks as a C header of constant tables."""
+def recorded_header(recorded: Recorded, code: StepCode, *, remembers: bool) -> str:
+    """Write recorded ticks as a C header of constant tables; `remembers`: with where the memory of main.c starts."""
     lines = [
         "/* Recorded ticks and the answers to them: see main.c. */",
         f"#ifndef {code.prefix.upper()}_RECORDED_H",
@@ -206,9 +213,10 @@ def recorded_header(recorded: Recorded, code: StepCode) -> str:
         "",
         f"static const int recorded_mode[TICKS] = {{{', '.join(map(str, recorded.mode))}}};",
     ]
+    if remembers:
+        lines += ["", "/* 1: the arm is at rest, and what was sent before is of no account */"]
+        lines += [f"static const int recorded_start[TICKS] = {{{', '.join(map(str, recorded.start))}}};"]
     units = {"q": "rad or m", "v": "m/s, rad/s", "qd": "rad/s or m/s"}
-    if recorded.qd_prev is not None:
-        units["qd_prev"] = units["qd"]
     for name, unit in units.items():
         table: Array = getattr(recorded, name)
         lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[TICKS][{table.shape[1]}] = {{"]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 # New at every tick; all other run-time inputs are parameters.
 SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
+# Parameters, with a default, that are new at every tick all the same: a batch takes a row of them for each.
+MEMORY: Final = ("qdd_prev",)
 _COMMENTS: Final = {
     "q": "joint positions",
     "v": "velocity that the hand asks for, along the mode's axes",

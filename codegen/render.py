@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from ..solvers.active_set import embedded_source, fixed_size_sources
+from .fields import MEMORY
 from .kernels import padded
 
 if TYPE_CHECKING:
@@ -96,8 +97,9 @@ def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
 def render_batch(code: StepCode) -> str:
     """Fill in the function that Python calls for many ticks at once."""
     signals = [field for field in code.inputs if field.name not in ("q", "v")]
-    values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows, "signals": signals}
-    return environment().get_template("batch.c.j2").render(values)
+    memory = [field for field in code.parameters if field.name in MEMORY]
+    values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
+    return environment().get_template("batch.c.j2").render(values | {"signals": signals, "memory": memory})
 
 
 def math_header() -> str:

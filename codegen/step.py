@@ -11,7 +11,7 @@ from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
 from . import qrqp
-from .fields import identifier
+from .fields import MEMORY, identifier
 from .model import step_code
 from .render import render_batch, render_step
 from .results import BatchResult, TickResult
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 SOLVER: Final = "active-set"
 SOLVERS: Final = (SOLVER, qrqp.NAME)
+_NONE: Final = np.zeros(0)
 _DOUBLE: Final = np.dtype(np.float64)
 _new: Final = tuple.__new__
 _FAILED: Final = STATUSES.index(Status.FAILED)
@@ -101,6 +102,7 @@ class CompiledStep:
         self._signals: Final = {name: np.zeros(0) for name, given in self._specs.items() if not given.size}
         self._signals.update({field.name: self._view(self._input, field.name) for field in code.inputs})
         self._fields: Final = {field.name: self._parameter_view(field.name) for field in code.parameters}
+        self._memory: Final = tuple(name for name in self._fields if name in MEMORY)
         self._q: Final = self._signals["q"]
         self._v: Final = self._signals["v"]
         self._shape_q: Final = self._q.shape
@@ -176,13 +178,13 @@ class CompiledStep:
             Velocities that the hand asks for [m/s, rad/s].
         **inputs : array_like
             Parameters (limits, weights, `dt`), the same for all states; and, of shape (N, size), what is new at every
-            tick (`qd_prev`, `v_fixed`).
+            tick (`qd_prev`, `v_fixed`). `qdd_prev` is taken either way, of shape (size,) or (N, size).
 
         Raises
         ------
         InputError
             Naming the input that is not usable. A state that isn't finite refuses its own tick only, whose status is
-            FAILED.
+            FAILED. NaN in `qdd_prev`, which may be infinite, refuses the batch.
         """
         states = np.ascontiguousarray(Q, dtype=float)
         twists = np.ascontiguousarray(V, dtype=float)
@@ -191,7 +193,8 @@ class CompiledStep:
             if values.shape != shape:
                 raise InputError(f"{name}: expected shape {shape}, got {values.shape}")
         signals = {name: self._signal(name, inputs, len(states)) for name in self._signals if name not in ("q", "v")}
-        inputs = {name: value for name, value in inputs.items() if name not in signals}
+        memory = {name: self._rows_of(name, inputs, len(states)) for name in self._memory}
+        inputs = {name: x for name, x in inputs.items() if name not in signals and not memory.get(name, _NONE).size}
         count, rows = len(states), self.code.rows
         result = BatchResult(
             np.empty_like(states),
@@ -204,6 +207,7 @@ class CompiledStep:
         restore = self._override(inputs, given=signals)
         try:
             per_tick = [signals[field.name] for field in self.code.inputs if field.name not in ("q", "v")]
+            per_tick += memory.values()
             doubles = [self._pointer("double *", x) for x in (states, twists, *per_tick, result.qd, result.eps)]
             integers = [self._pointer("int *", x) for x in (result.codes, result.iterations, result.sides)]
             self._run_batch(self._parameters, 0, count, *doubles, *integers)
@@ -225,6 +229,15 @@ class CompiledStep:
             raise InputError(f"{name}: expected shape ({count}, {size}), got {inputs[name]!r}") from None
         if values.shape != (count, size):
             raise InputError(f"{name}: expected shape ({count}, {size}), one row for each tick, got {values.shape}")
+        return values
+
+    def _rows_of(self, name: str, inputs: dict[str, ArrayLike], count: int) -> Array:
+        """One row of a parameter for each tick; none at all where it is left out, or the same for all of them."""
+        if name not in inputs or np.ndim(inputs[name]) < 2:
+            return _NONE
+        values = self._signal(name, inputs, count)
+        if np.isnan(values).any():
+            raise InputError(f"{name}: expected numbers, got NaN in row {int(np.isnan(values).any(axis=1).argmax())}")
         return values
 
     def _override(self, inputs: dict[str, ArrayLike], given: Container[str] = ()) -> list[tuple[Array, Array]]:

@@ -30,7 +30,7 @@ from drilling import (
 )
 
 from kinqp.benchmarks.scenarios.drilling import INSERTED, START_DEG
-from kinqp.formulations import Mode
+from kinqp.formulations import DEFAULT_DT, Mode
 from kinqp.solvers import Status
 
 ROWS = (
@@ -70,13 +70,15 @@ def tick_times() -> None:
         drilled = drill(make_controller(formulation), 10.0)
         run, times = drilled.run, []
         for step, name in zip(make_steps(formulation), ("leading", "turning", "drilling"), strict=True):
-            ticks = drilled.ticks(step.mode)[1:]
+            ticks = drilled.ticks(step.mode)[2:]
             given: dict[str, object] = {"self_collision_margin": MARGIN, "self_collision_deceleration": DECELERATION}
             if "remote_centre_pivot" in step.inputs:
                 given["remote_centre_pivot"] = drilled.entry
                 given |= {"task_weight": WEIGHT} if "task_weight" in step.inputs else {}
             if "qd_prev" in step.inputs:
                 given["qd_prev"] = run.qd[ticks - 1]
+            if "qdd_prev" in step.inputs:
+                given["qdd_prev"] = (run.qd[ticks - 1] - run.qd[ticks - 2]) / DEFAULT_DT
             best = np.inf
             for _ in range(7):
                 start = time.perf_counter()

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 MARGIN: Final = 1.001
 #: Cost above the best known, relative to the objective's two parts, at least 1 [m^2/s^2 at unit weights].
 COST_TOLERANCE: Final = 1e-6
+#: Inputs that tell of the ticks before, by the names they have in `StateSet`.
+MEMORY: Final[tuple[str, ...]] = ("qd_prev", "qdd_prev")
 _ERROR_TOLERANCE: Final = 1e-9
 
 
@@ -101,7 +103,7 @@ class Answers:
 
 def inputs_of(names: tuple[str, ...], states: StateSet, index: int, given: Mapping[str, ArrayLike]) -> dict[str, Any]:
     """The keywords of a call at a state, of those that the step takes."""
-    memory = {"qd_prev": states.qd_prev[index]} if "qd_prev" in names else {}
+    memory = {name: getattr(states, name)[index] for name in MEMORY if name in names}
     return {**memory, **{name: value for name, value in given.items() if name in names}}
 
 
@@ -197,13 +199,13 @@ def count_refused(row: Row, statuses: list[Status]) -> None:
 
 
 def judge_bad_input(row: Row, step: Any, states: StateSet, given: Mapping[str, ArrayLike]) -> None:
-    """NaN or infinity in any input of the state must be an error that names it."""
+    """NaN or infinity in any input of the state must be an error that names it; accelerations may be infinite."""
     wrong = []
     for index in range(min(3, len(states.q))):
         good = {"q": states.q[index], "v": states.v[index], **inputs_of(step.inputs, states, index, given)}
         missed = 0
-        for name in (name for name in ("q", "v", "qd_prev") if name in good):
-            for bad in (np.nan, np.inf, -np.inf):
+        for name in (name for name in ("q", "v", *MEMORY) if name in good):
+            for bad in (np.nan,) if name == "qdd_prev" else (np.nan, np.inf, -np.inf):
                 values = good[name].copy()
                 values[index % values.size] = bad
                 try:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ...solvers import Status
-from .answers import count_refused, inputs_of, judge_bad_input, judge_commands
+from .answers import MEMORY, count_refused, inputs_of, judge_bad_input, judge_commands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -39,7 +39,7 @@ def judge_compiled(
     """Check a compiled step on all states; give its commands and status codes."""
     count = len(states.q)
     taken = {name: value for name, value in given.items() if name in step.inputs}
-    signals = {"qd_prev": states.qd_prev} if "qd_prev" in step.inputs else {}
+    signals = {name: getattr(states, name) for name in MEMORY if name in step.inputs}
     first = step.batch(states.q, states.v, **signals, **taken)
     again = step.batch(states.q, states.v, **signals, **taken)
     fields = ("qd", "eps", "codes", "iterations", "sides")
@@ -66,13 +66,17 @@ def _differs(one: NDArray[Any], two: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _judge_bad_batch(row: Row, step: CompiledStep, states: StateSet, taken: Mapping[str, ArrayLike]) -> None:
-    """NaN in a tick of a batch refuses that tick alone, with finite numbers."""
+    """NaN in a tick of a batch refuses that tick alone, with finite numbers.
+
+    In `qdd_prev`, where it refuses the batch, none is put.
+    """
     values = {"q": states.q.copy(), "v": states.v.copy(), "qd_prev": states.qd_prev.copy()}
     names = [name for name in values if name in ("q", "v") or name in step.inputs]
+    change = {"qdd_prev": states.qdd_prev} if "qdd_prev" in step.inputs else {}
 
     def batch() -> Any:
         signals = {name: values[name] for name in names if name not in ("q", "v")}
-        return step.batch(values["q"], values["v"], **signals, **taken)
+        return step.batch(values["q"], values["v"], **signals, **change, **taken)
 
     clean = batch()
     wrong = np.zeros(len(states.q), dtype=int)

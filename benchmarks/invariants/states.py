@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.metadata
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -32,6 +32,8 @@ KINDS: Final = (
 )
 # 0: a hand at rest; 1e3: what no arm can follow, nor a hand mean [m/s, rad/s].
 SPEEDS: Final = (0.0, 1e-6, 1e-2, 0.2, 2.0, 1e3)
+# Marks the stream of the last accelerations, which leaves all that `draw` gives as it is.
+_CHANGE: Final = 1
 _OFFSETS: Final = (0.0, 1e-17, 1e-12, 1e-9, 1e-5, 1e-3, 1e-2, -1e-17, -1e-9, -1e-5, -1e-2)
 # How often another start is tried, and how close to a singularity it has to come.
 _SINGULAR_STARTS: Final = 8
@@ -71,6 +73,9 @@ class StateSet:
     kinds : tuple of str
     q, qd_prev : ndarray, shape (N, nv)
         Positions [rad or m], and commands of the tick before [rad/s or m/s]: within their bounds or on them.
+    qdd_prev : ndarray, shape (N, nv)
+        Accelerations of the tick before: within `qdd_max`, on it, up to three times as much, as after a rate limit that
+        yielded, or infinite, unknown [rad/s^2 or m/s^2].
     v : ndarray, shape (N, m_free)
         Hand [m/s, rad/s].
     J_free, J_fixed : ndarray, shapes (N, m_free, nv) and (N, m_fixed, nv)
@@ -84,6 +89,7 @@ class StateSet:
     kinds: tuple[str, ...]
     q: Array
     qd_prev: Array
+    qdd_prev: Array
     v: Array
     J_free: Array
     J_fixed: Array
@@ -93,8 +99,8 @@ class StateSet:
 
     def first(self, count: int) -> StateSet:
         """The first so many of them."""
-        arrays = (self.q, self.qd_prev, self.v, self.J_free, self.J_fixed, self.low, self.high, self.braking)
-        return StateSet(self.kinds[:count], *(values[:count] for values in arrays))
+        arrays = (getattr(self, field.name)[:count] for field in fields(self) if field.name != "kinds")
+        return StateSet(self.kinds[:count], *arrays)
 
 
 class States:
@@ -144,6 +150,19 @@ class States:
         share = rng.uniform(-1.0, 1.0, nv) * rng.choice([0.0, 0.01, 1.0, 1.0])
         return kind, q, v, share if rng.random() < 0.75 else np.sign(share)
 
+    def draw_change(self, index: int) -> Array:
+        """Give the last accelerations of state number `index` as parts of `qdd_max`, infinite where unknown."""
+        rng = np.random.default_rng((self.seed, index, _CHANGE))
+        nv, what = self.robot.nv, rng.random()
+        share, side = rng.uniform(-1.0, 1.0, nv), rng.choice([-1.0, 1.0], nv)
+        if what < 0.25:  # of all joints, now and then of some
+            return np.where(rng.random(nv) < rng.choice([0.5, 1.0, 1.0, 1.0]), side * np.inf, share)
+        if what < 0.5:
+            return np.where(rng.random(nv) < 0.6, side, share)
+        if what < 0.625:
+            return np.where(rng.random(nv) < 0.3, 3.0 * side, 3.0 * share)
+        return np.asarray(share * rng.choice([0.0, 0.01, 1.0, 1.0]))
+
     def take(self, count: int) -> StateSet:
         """Draw states 0 ... count-1, and work out what a command there is judged by."""
         drawn = [self.draw(index) for index in range(count)]
@@ -155,6 +174,7 @@ class States:
             tuple(each[0] for each in drawn),
             q,
             qd_prev,
+            np.array([self.draw_change(index) for index in range(count)]) * self.robot.qdd_max,
             v,
             rows[:, list(self.mode.free_rows)],
             rows[:, list(self.mode.fixed_rows)],

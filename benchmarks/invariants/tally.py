@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, field_serializer
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -55,7 +55,7 @@ class Violation(BaseModel):
         Number of that state; see `States`.
     kind : str
     state : dict
-        Its `q`, `v` and `qd_prev`.
+        Its `q`, `v`, `qd_prev` and `qdd_prev`.
     """
 
     count: int = 0
@@ -64,6 +64,11 @@ class Violation(BaseModel):
     index: int = -1
     kind: str = ""
     state: dict[str, list[float]] = Field(default_factory=dict)
+
+    @field_serializer("state", when_used="json")
+    def _words_for_infinity(self, state: dict[str, list[float]]) -> dict[str, list[float | str]]:
+        """JSON knows no infinity; as words they are read back as they were."""
+        return {name: [x if np.isfinite(x) else str(x) for x in values] for name, values in state.items()}
 
 
 class Row(BaseModel):
@@ -147,4 +152,4 @@ class Row(BaseModel):
 
 def state_at(states: StateSet, index: int) -> dict[str, Any]:
     """One state's inputs, to the last bit."""
-    return {name: getattr(states, name)[index].tolist() for name in ("q", "v", "qd_prev")}
+    return {name: getattr(states, name)[index].tolist() for name in ("q", "v", "qd_prev", "qdd_prev")}

@@ -196,7 +196,7 @@ def test_exported_code_gives_the_recorded_answers(modes: list[str], tmp_path: Pa
     assert done.returncode == 0, done.stdout
     assert f"{200 * len(modes)} ticks" in done.stdout
     readme = (tmp_path / "README.md").read_text()
-    assert "input.qd_prev: what was sent last" in readme
+    assert "input.qd_prev[i] = sent[i];" in readme
     assert "output.qd is the fastest admissible braking: the safe stop" in readme
     header = (tmp_path / "lbr.h").read_text()
     assert "the fastest admissible braking unless solved" in header

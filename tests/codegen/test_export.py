@@ -5,10 +5,12 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kinqp.codegen import ExportError, export_c
 from kinqp.formulations import Mode, ModeError
+from kinqp.formulations.rate import JERK_TIME
 from kinqp.robots import load_robot
 from kinqp.solvers.native import compiler
 from tests.robots.arms import arm
@@ -26,10 +28,10 @@ def exported(formulation: str, modes: tuple[str, ...], robot: str = "lbr_med14")
         return {path.name: path.read_text() for path in Path(folder).iterdir()}
 
 
-def check(folder: Path) -> subprocess.CompletedProcess[str]:
+def check(folder: Path, *flags: str) -> subprocess.CompletedProcess[str]:
     """Build the check with the strictest warnings, without cmake, and run it."""
     sources = sorted(path.name for path in folder.glob("*.c"))
-    line = [*compiler(), *STRICT, *sources, "-o", "check", "-lm"]
+    line = [*compiler(), *STRICT, *flags, *sources, "-o", "check", "-lm"]
     built = subprocess.run(line, cwd=folder, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr[:2000]
     return subprocess.run(["./check"], cwd=folder, capture_output=True, text=True, check=False)
@@ -40,12 +42,24 @@ def write(folder: Path, files: dict[str, str]) -> None:
         (folder / name).write_text(text)
 
 
+def table(header: str, name: str) -> list[list[float]]:
+    """One of the tables of recorded.h, row by row."""
+    rows = header.partition(f" recorded_{name}[")[2].partition("};")[0].splitlines()[1:]
+    return [[float(x) for x in row.strip(" {},").split(",")] for row in rows if row.strip()]
+
+
+ROBUST_CASES = {
+    "joint-space-robust": (("fix-orientation", "rcm:-0.1"), "lbr_med14"),
+    "cartesian-error-robust": (("line:z",), "ur5e"),
+}
 CASES = [
     ("cartesian-error", ("fix-orientation",), "lbr_med14"),
     ("joint-space", ("fix-orientation",), "lbr_med14"),
     ("cartesian-error", ("line:z", "fix-position", "rcm:-0.1"), "lbr_med14"),
     ("joint-space", ("plane:0,1,0",), "ur5"),
     ("hierarchical", ("fix-orientation", "free"), "lbr_med14"),
+    ("joint-space-robust", ("fix-orientation", "rcm:-0.1"), "lbr_med14"),
+    ("cartesian-error-robust", ("line:z",), "ur5e"),
 ]
 
 
@@ -77,6 +91,46 @@ def test_a_wrong_answer_is_noticed(tmp_path: Path) -> None:
     done = check(tmp_path)
     assert done.returncode == 1
     assert "FAILED" in done.stdout
+
+
+@pytest.mark.parametrize("formulation", ["joint-space-robust", "cartesian-error-robust"])
+@pytest.mark.parametrize(
+    "forgotten",
+    [
+        "parameters.qdd_prev[i] = change[i];",
+        "input.qd_prev[i] = sent[i];",
+        "change[i] = (now[i] - sent[i]) / parameters.dt;",
+        "sent[i] = now[i];",
+    ],
+)
+def test_the_check_needs_last_command_and_acceleration(formulation: str, forgotten: str, tmp_path: Path) -> None:
+    files = dict(exported(formulation, *ROBUST_CASES[formulation]))
+    assert files["main.c"].count(forgotten) == 1
+    files["main.c"] = files["main.c"].replace(forgotten, "(void)0;")
+    write(tmp_path, files)
+    done = check(tmp_path, "-Wno-unused-but-set-variable", "-Wno-unused-variable")
+    assert done.returncode == 1
+    assert "FAILED" in done.stdout
+
+
+def test_recorded_accelerations_keep_to_the_jerk_limit() -> None:
+    """From rest, in a mode whose locked rows force little; with the last acceleration unknown it's all at once."""
+    files = exported("joint-space-robust", *ROBUST_CASES["joint-space-robust"])
+    qd = np.vstack([np.zeros(7), np.zeros(7), table(files["recorded.h"], "qd")[:200]])
+    jerk = np.abs(np.diff(qd, n=2, axis=0)).max(axis=1) / 1e-3 / arm("lbr_med14").qdd_max.max()
+    assert jerk.max() < 1.25 * 1e-3 / JERK_TIME
+    assert np.median(jerk) > 0.9 * 1e-3 / JERK_TIME
+
+
+def test_what_remembers_nothing_is_given_no_memory() -> None:
+    files = exported("joint-space", ("fix-orientation",))
+    for text in ("sent", "qd_prev", "recorded_start"):
+        assert text not in files["main.c"] + files["recorded.h"]
+        assert text not in files["README.md"].replace("send output.qd", "").replace("represent", "")
+    files = exported("joint-space-robust", *ROBUST_CASES["joint-space-robust"])
+    for line in ("input.qd_prev[i] = sent[i];", "parameters.qdd_prev[i] = (output.qd[i] - sent[i]) / parameters.dt;"):
+        assert line in files["README.md"]
+    assert "parameters.qdd_prev[i] = 0.0;" in files["README.md"]
 
 
 def test_the_same_bytes_every_time(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinqp.formulations import Mode
+from kinqp.formulations import InputError, Mode
 from kinqp.solvers import Status
 from tests.codegen.compiled import build_all, compiled, interpreted, ticks
 from tests.codegen.test_parity import ROW_ROUNDING, TOLERANCE, check_safe, weakest_locked
@@ -45,6 +45,45 @@ def test_compiled_and_interpreted_robust_steps_agree(formulation: str) -> None:
     build_all(cases)
     for robot, _, mode in cases:
         check(robot, formulation, mode, 18)
+
+
+@pytest.mark.parametrize("formulation", ROBUST)
+def test_batches_take_the_last_commands_and_accelerations_of_each_tick(formulation: str) -> None:
+    step, robot = compiled("lbr_med14", formulation, "fix-orientation", quick=True), arm("lbr_med14")
+    rng = np.random.default_rng(3)
+    drawn = ticks("lbr_med14", "fix-orientation", 24, seed=3)
+    Q, V = (np.array([tick[i] for tick in drawn]) for i in (1, 2))
+    # Within the locked rows: what they force on the joints widens the jerk limit, up to all of the acceleration limit.
+    free = [null_projector(rows_at(robot, Mode.parse("fix-orientation"), q)[1]) for q in Q]
+    P = np.array([N @ (robot.qd_max * rng.uniform(-0.01, 0.01, 7)) for N in free])
+    change = np.array([N @ (robot.qdd_max * rng.uniform(-0.5, 0.5, 7)) for N in free])
+    change[::4], change[1::4, 2], change[2::4] = np.inf, -np.inf, 3.0 * change[2::4]
+    many, unknown = step.batch(Q, V, qd_prev=P, qdd_prev=change), step.batch(Q, V, qd_prev=P)
+    for i, (q, v, qd, qdd) in enumerate(zip(Q, V, P, change, strict=True)):
+        one = step(q, v, qd_prev=qd, qdd_prev=qdd)
+        assert one.qd.tobytes() == many.qd[i].tobytes()
+        assert one.status is many.status[i]
+        assert one.iterations == many.iterations[i]
+    # What a tick is told is not left to the next one, nor to the next batch, and makes a difference where it is known.
+    np.testing.assert_array_equal(many.qd[::4], unknown.qd[::4])
+    assert (many.qd != unknown.qd).any(axis=1).sum() > 10
+    np.testing.assert_array_equal(step.batch(Q, V, qd_prev=P).qd, unknown.qd)
+    # The same for all, as any parameter.
+    same = step.batch(Q, V, qd_prev=P, qdd_prev=change[3]).qd
+    np.testing.assert_array_equal(same, step.batch(Q, V, qd_prev=P, qdd_prev=np.tile(change[3], (24, 1))).qd)
+
+
+def test_last_accelerations_of_the_wrong_shape_or_without_a_number_are_named() -> None:
+    step = compiled("lbr_med14", "joint-space-robust", "fix-orientation", quick=True)
+    Q, V = np.zeros((3, 7)), np.zeros((3, 3))
+    change = np.zeros((3, 7))
+    with pytest.raises(InputError, match=r"qdd_prev: expected shape \(3, 7\), one row for each tick, got \(2, 7\)"):
+        step.batch(Q, V, qd_prev=Q, qdd_prev=change[:2])
+    with pytest.raises(InputError, match=r"qdd_prev: expected shape \(7,\).* got shape \(3,\)"):
+        step.batch(Q, V, qd_prev=Q, qdd_prev=np.zeros(3))
+    change[1, 4] = np.nan
+    with pytest.raises(InputError, match="qdd_prev: expected numbers, got NaN in row 1"):
+        step.batch(Q, V, qd_prev=Q, qdd_prev=change)
 
 
 @pytest.mark.long
