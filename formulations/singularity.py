@@ -27,8 +27,8 @@ PULL_GAIN: Final = 2.0
 LOST: Final = 0.02
 # How far ahead the side is looked up [s]: the velocity of a few ticks outweighs an encoder's noise.
 AHEAD: Final = 0.1
-# Less than this to one side is no side [m or rad]: along whole self-motions that are singular all the way it is rounding
-# which would choose, and differently from one tick to the next.
+# Less than this to one side is no side [m or rad]: along self-motions that are singular all the way rounding would
+# choose, and differently from one tick to the next.
 UNDECIDED: Final = 1e-9
 # |self-motion gradient| below which there is no way out worth going [1].
 FLAT: Final = 1e-2
