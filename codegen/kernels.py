@@ -146,6 +146,11 @@ def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: in
     )
 
 
+def locked_array(cuts: Sequence[Cut]) -> str:
+    """Name of the array, as `stage` lays it out, that has the locked rows, padded; empty if no kernel takes them."""
+    return next((f"k{index}_1" for index, cut in enumerate(cuts) if cut.kernel == "locked_rows"), "")
+
+
 def used(cuts: Sequence[Cut], values: Sequence[ca.SX]) -> list[Cut]:
     """Leave out the cuts that no value depends on."""
     needed = list(values)

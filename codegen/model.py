@@ -12,7 +12,7 @@ from .cascade import cascade_code
 from .definite import require_definite
 from .emit import emit, needed_for
 from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
-from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
+from .kernels import KERNELS, agree, locked_array, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 
 if TYPE_CHECKING:
@@ -77,7 +77,8 @@ class ModeCode(ModeText):
     """One motion mode of a formulation of one QP.
 
     `body` is what every tick computes, `late_body` what is needed only where the minimiser without rows is outside of
-    some, `start_body` what is needed of that only to keep to admissible points.
+    some, `start_body` what is needed of that only to keep to admissible points. `locked` is the array of the locked
+    rows that a command is judged by, empty where it keeps them by equalities, or by what goes with the hand alone.
     """
 
     n: int
@@ -91,6 +92,7 @@ class ModeCode(ModeText):
     late_body: tuple[str, ...]
     start_body: tuple[str, ...]
     kernels: tuple[str, ...]
+    locked: str
 
     @property
     def size(self) -> str:
@@ -253,6 +255,7 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
         start_body=tuple(third),
         row_body=row_statements(tick),
         kernels=tuple(dict.fromkeys(cut.kernel for cut in cuts)),
+        locked="" if reduced.m_eq or shape.diagonal else locked_array(cuts),
         finite=tuple(field for name, field in fields.items() if name in SIGNALS and field.size),
         rows=reduced.rows,
         inputs=inputs,

@@ -68,8 +68,9 @@ def render_step(code: StepCode) -> dict[str, str]:
         "rows": code.rows,
         "max_iterations": code.max_iterations,
         "brake": code.brake_body,
-        # Equalities are kept by the solver; what a pseudo-inverse leaves in the locked rows grows with the hand.
-        "checked": [mode for mode in code.single if mode.m_fixed and not mode.m_eq],
+        # Equalities are kept by the solver; what a pseudo-inverse leaves in the locked rows grows with the hand. Where
+        # a mode has these rows at hand its tick looks at them itself.
+        "checked": [mode for mode in code.single if mode.m_fixed and not mode.m_eq and not mode.locked],
         "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
     }
     values |= _of_one_qp(code, sources) if code.single else {"solver_source": embedded_source("KINQP_INLINE")}

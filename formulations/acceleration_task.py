@@ -119,13 +119,17 @@ class YieldingLimits:
         *,
         torques: bool,
         penalty: float = STRETCH_PENALTY,
+        known: ca.SX | float = 0.0,
     ) -> YieldingLimits:
-        """Add limits on `ahead`, affine in the variables, (nv, 1), and parameters of what exceeding them costs."""
+        """Add limits on `ahead`, affine in the variables, (nv, 1), and parameters of what exceeding them costs.
+
+        `known`: how well `ahead` is known, scalar [rad/s or m/s]; the joint limits are widened by it.
+        """
         stretch = qp.variable("stretch", 1)
         weight = tick.parameter("stretch_penalty", penalty, lowest=0.0, positive=True)
         qp.minimize(1 + stretch / STRETCH_SCALE, weight=STRETCH_SCALE * weight, name="acceleration limits")
         qp.between(0, stretch, ca.inf, name="stretch of acceleration limits")
-        qp.between(hand.ahead(tick.qd_lo), ahead, hand.ahead(tick.qd_hi), name="joint limits")
+        qp.between(hand.ahead(tick.qd_lo) - known, ahead, hand.ahead(tick.qd_hi) + known, name="joint limits")
         more = (hand.T * tick.qdd_max) * stretch
         qp.between(tick.qd_prev + hand.T * tick.qdd_lo, ahead + more, ca.inf, name="lower acceleration limits")
         qp.between(-ca.inf, ahead - more, tick.qd_prev + hand.T * tick.qdd_hi, name="upper acceleration limits")

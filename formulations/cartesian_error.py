@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from .base import Formulation
+from .inverse import rounding_of_inverse
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
@@ -24,7 +25,8 @@ class CartesianError(Formulation):
     (`v_fixed`) both carry the joint velocity that gives the locked rows theirs, and the guided rows make up for it.
 
     Self-motion is out of its reach: the command stays in the range of J#. Zero motion, :math:`\varepsilon = -v`, is
-    always feasible while `v_fixed` is zero. The thesis stacks [J#; -J#]; two-sided rows are the same problem.
+    always feasible while `v_fixed` is zero. The thesis stacks [J#; -J#]; two-sided rows are the same problem. Bounds
+    are widened by what J#'s rounding makes of the hand, 1e-13 of its speed (`rounding_of_inverse`).
 
     Run-time parameters
     -------------------
@@ -41,7 +43,7 @@ class CartesianError(Formulation):
         eps = qp.variable("eps", tick.m_free)
         weight = tick.parameter("task_weight", 1.0, size=tick.m_free, lowest=0.0, positive=True)
         qp.minimize(eps, weight=weight, name="Cartesian error")
-        qd_d = tick.qd_task
-        qp.between(tick.qd_lo - qd_d, tick.inverse @ eps, tick.qd_hi - qd_d, name="joint limits")
+        qd_d, known = tick.qd_task, rounding_of_inverse(tick.v_left)
+        qp.between(tick.qd_lo - known - qd_d, tick.inverse @ eps, tick.qd_hi + known - qd_d, name="joint limits")
         qp.command(qd_d + tick.inverse @ eps)
         qp.feasible(eps=-tick.v_left)

@@ -10,6 +10,7 @@ import casadi as ca
 from .acceleration_task import HandAcceleration, YieldingLimits
 from .algebra import dot, matmul
 from .base import Formulation, SafeStop
+from .inverse import rounding_of_inverse
 
 if TYPE_CHECKING:
     from .program import QuadraticProgram
@@ -87,6 +88,7 @@ class CartesianErrorAcceleration(Formulation):
         towards = across + ratio * (tick.qd_fixed - across)
         w = tick.v - hand.curvature - matmul(tick.J_free, towards)
         ahead = towards + matmul(tick.inverse, w) - ((ratio - 1) * within) * brake + tick.inverse @ eps
-        limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits)
+        known = rounding_of_inverse(ca.vertcat(w, ratio * within))
+        limits = YieldingLimits.declare(qp, tick, hand, ahead, torques=self.torque_limits, known=known)
         qp.command(hand.command(ahead))
         qp.feasible(eps=-w, brake=1, **limits.feasible(hand.ahead(tick.qd_fixed)))

@@ -18,6 +18,10 @@ from .algebra import balanced_sum, dot, inverse_of_positive, matmul
 DEPENDENT_ROW: Final = 1e-10
 # Entries of a projected row smaller than this (relative to the row) are rounding.
 ROUNDING: Final = 1e-12
+# Of J#: 1e-16 in J_bar, times 1/lambda_max^2 = 400, and a digit for what comes before.
+INVERSE_ROUNDING: Final = 1e-13
+# No hand is so fast that bounds are widened by more [rad/s or m/s]: a tenth of what a command may be outside of them.
+WIDEST: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -138,3 +142,13 @@ def squared_singular_value_estimate(gram: ca.SX) -> ca.SX:
     shift = 1e-12 * ca.trace(gram) + 1e-100
     inverse = inverse_of_positive(gram + shift * ca.SX.eye(m))
     return 1 / ca.sqrt(balanced_sum([entry**2 for entry in ca.vertsplit(ca.vec(inverse))]))
+
+
+def rounding_of_inverse(motion: ca.SX) -> ca.SX:
+    """How well J# times `motion`, shape (m, 1), is known, scalar [rad/s or m/s]: what to widen bounds on it by.
+
+    Where two joints move only together, their rows of J# are parallel but for rounding. With both on a limit, on
+    opposite sides, the rows leave a plane of directions; taken as exact, rounding blocks half of that plane.
+    """
+    size = balanced_sum([ca.fabs(motion[i]) for i in range(motion.numel())])
+    return ca.fmin(INVERSE_ROUNDING * size, WIDEST)

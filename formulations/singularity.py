@@ -27,6 +27,9 @@ PULL_GAIN: Final = 2.0
 LOST: Final = 0.02
 # How far ahead the side is looked up [s]: the velocity of a few ticks outweighs an encoder's noise.
 AHEAD: Final = 0.1
+# Less than this to one side is no side [m or rad]: along self-motions that are singular all the way rounding would
+# choose, and differently from one tick to the next.
+UNDECIDED: Final = 1e-9
 # |self-motion gradient| below which there is no way out worth going [1].
 FLAT: Final = 1e-2
 
@@ -109,7 +112,7 @@ def pull(tick: Tick, measured: Damping) -> ca.SX:
     # As it will be a moment ahead: a choice once made is kept whatever the noise on q.
     turn = ca.substitute(ca.jtimes(held, tick.q, tick.qd_prev), left, ca.densify(rows))
     turned = dot(w + AHEAD * turn, side)
-    w = w + ca.sqrt(lost2) * ca.if_else(turned < 0, -1, 1) * side
+    w = w + ca.sqrt(lost2) * ca.if_else(turned < -UNDECIDED, -1, 1) * side
     w = w / ca.sqrt(dot(w, w) + 1e-20)
     gradient = ca.gradient(dot(held, right), tick.q)
     gradient = ca.substitute(gradient, ca.vertcat(left, right), ca.densify(ca.vertcat(rows, w)))

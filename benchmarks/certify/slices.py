@@ -52,7 +52,7 @@ class Slice:
 
     theta = (v, s, b): the hand [m/s, rad/s], a factor of all bounds, and the bounds of the free sides. Only its
     direction counts, since v, bounds and answer scale together. At s = 1 the bounds of all other sides are the state's
-    own.
+    own. What the declaration widens them by for J#'s rounding (`rounding_of_inverse`) is left out, as rounding is.
 
     Attributes
     ----------

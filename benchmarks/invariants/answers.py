@@ -176,14 +176,16 @@ def judge_answers(row: Row, states: StateSet, answers: Answers, best: Array, mis
     """Check what a solver's answers are worth against the best costs known, and count what was refused.
 
     By weak duality a cost can be below an exact one by the multipliers times what the rows are `missed` by: near a
-    singularity, where multipliers are 1e8, an answer within a solver's tolerance of 1e-10 may look better by 1e-2.
+    singularity, where multipliers are 1e8, an answer within a solver's tolerance of 1e-10 may look better by 1e-2. An
+    answer's own missed rows are worth as much, in either direction: it may be the best for rows shifted by them.
     """
     solved = answers.solved
     row.check("raised", [bool(text) for text in answers.raised], 0.0, states)
     row.check("told", [not told for told in answers.told], 0.0, states)
     row.check("residuals", answers.residual, JUDGE_TOLERANCE, states)
     above = np.where(solved & np.isfinite(best), (answers.cost - best) / answers.scale, 0.0)
-    row.check("cost", np.maximum(above, 0.0), COST_TOLERANCE + answers.price * missed / answers.scale, states)
+    rows_worth = answers.price * (missed + answers.missed) / answers.scale
+    row.check("cost", np.maximum(above, 0.0), COST_TOLERANCE + rows_worth, states)
     row.wrong_solved = sum(
         claimed is Status.SOLVED and status is not Status.SOLVED
         for claimed, status in zip(answers.claimed, answers.status, strict=True)

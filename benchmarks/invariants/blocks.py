@@ -17,6 +17,7 @@ from ...solvers import get_solver
 from .answers import judge_answers, judge_bad_input, judge_commands, recorded_step, solve_all
 from .compiled import judge_compiled, judge_parity
 from .declared import judge_declared
+from .rounding import judge_rounding
 from .states import States, StateSet, arm
 from .tally import Row
 from .worth import judge_worth
@@ -125,7 +126,8 @@ def run_block(block: Block) -> list[Row]:
         if REFERENCE in interpreted:
             recorder.solver = get_solver(REFERENCE)
             apart = judge_parity(row, (step, made_c), mine, GIVEN, interpreted[REFERENCE], compiled)
-            judge_worth(row, step, mine, GIVEN, compiled, apart)
+            left = judge_worth(row, step, mine, GIVEN, compiled, apart)
+            judge_rounding(row, step, mine, GIVEN, compiled[0], left)
         row.cpu = process_time() - start
     return list(rows.values())
 

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 NUMBERS: Final = 1e-9
 _ALLOWED: Final = max(COST_TOLERANCE, JUDGE_TOLERANCE)
-_TOLERANCES: Final = dict.fromkeys(("tol_feas", "tol_gap_abs", "tol_gap_rel"), 1e-10)
+_TOLERANCE: Final = 1e-10
+_TOLERANCES: Final = dict.fromkeys(("tol_feas", "tol_gap_abs", "tol_gap_rel"), _TOLERANCE)
 
 
 def judge_declared(
@@ -100,8 +101,12 @@ def _solve(made: CvxpyProblem) -> Array | None:
 
 
 def _primal(qp: QP, x: Array) -> tuple[float, float]:
-    """Largest violation of a row, and largest relative to the row's terms."""
+    """Largest violation of a row, and largest relative to the row's terms of those above the solver's tolerance.
+
+    A joint that hardly takes part has a row of 1e-9, of which the tolerance, absolute as it is, may be any share.
+    """
     value = qp.stacked @ x
     violation = np.maximum(np.maximum(value - qp.upper, qp.lower - value), 0.0)
     terms = np.maximum(np.abs(qp.stacked) @ (1.0 + np.abs(x)), 1e-300)
-    return float(np.max(violation, initial=0.0)), float(np.max(violation / terms, initial=0.0))
+    relative = np.where(violation > _TOLERANCE, violation / terms, 0.0)
+    return float(np.max(violation, initial=0.0)), float(np.max(relative, initial=0.0))

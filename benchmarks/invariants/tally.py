@@ -36,6 +36,8 @@ INVARIANTS: Final[Mapping[str, str]] = {
     "apart": "the same difference, whatever the neighbours say",
     "compiled rows": "compiled: error of a row of the interpreted step's problem, relative to its terms, at least 1",
     "compiled cost": "compiled: cost in that problem above its answer's, relative to its terms and what a move costs",
+    "unexplained": "compiled: states with parity or apart broken, neither worth as much nor within what rounding "
+    "of the state does to the interpreted command",
     "cvxpy numbers": "difference of the declared objective in cvxpy, relative",
     "cvxpy answer": "difference in cost, or scaled primal residual, of the declared problem solved by cvxpy",
 }

@@ -41,7 +41,7 @@ def judge_worth(
     given: Mapping[str, ArrayLike],
     compiled: tuple[Array, NDArray[np.intc]],
     apart: NDArray[np.bool_],
-) -> None:
+) -> NDArray[np.bool_]:
     """Check rows and cost of compiled commands, of the states that both solved.
 
     Parameters
@@ -57,6 +57,11 @@ def judge_worth(
         Commands and status codes of N states, or more.
     apart : ndarray of bool, shape (N,)
         States whose commands are apart; how many of them are worth the same is noted.
+
+    Returns
+    -------
+    ndarray of bool, shape (N,)
+        Which states are apart and not worth the same.
     """
     rows, costs = np.zeros(len(apart)), np.zeros(len(apart))
     for i in np.flatnonzero(compiled[1][: len(apart)] == 0):
@@ -65,9 +70,11 @@ def judge_worth(
             each = [worth(instance, solution.x, compiled[0][i]) for instance, solution in step.solved]
             rows[i], costs[i] = np.max(each, axis=0)
     row.notes["parity or apart broken"] = int(np.sum(apart))
-    row.notes["parity or apart broken, and worth as much"] = int(np.sum(apart & (np.maximum(rows, costs) <= TOLERANCE)))
+    as_much = np.maximum(rows, costs) <= TOLERANCE
+    row.notes["parity or apart broken, and worth as much"] = int(np.sum(apart & as_much))
     row.check("compiled rows", rows, TOLERANCE, states)
     row.check("compiled cost", costs, TOLERANCE, states)
+    return np.asarray(apart & ~as_much)
 
 
 def worth(instance: Instance, x: Array, qd: Array) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from kinqp.benchmarks.invariants.answers import (
     solve_all,
 )
 from kinqp.benchmarks.invariants.compiled import judge_compiled, judge_parity
+from kinqp.benchmarks.invariants.declared import _primal as primal
 from kinqp.benchmarks.invariants.declared import judge_declared
 from kinqp.benchmarks.invariants.states import KINDS, StateSet, mode_rows
 from kinqp.benchmarks.invariants.worth import judge_worth
@@ -252,6 +253,22 @@ def test_right_commands_pass() -> None:
     assert made.refused == {}
 
 
+def test_a_cost_is_allowed_what_missed_rows_are_worth_and_no_more() -> None:
+    right = interpreted()[1]
+    count = len(right.cost)
+    for above, count_wrong in ((0.5e-4, 0), (2e-4, count)):
+        answers = dataclasses.replace(
+            right,
+            cost=right.cost + above,
+            scale=np.ones(count),
+            price=np.full(count, 1e9),
+            missed=np.full(count, 1e-13),
+        )
+        made = row()
+        judge_answers(made, states(), answers, right.cost, np.zeros(count))
+        assert made.checked["cost"].count == count_wrong
+
+
 @pytest.mark.parametrize("name", ["finite", "bounds", "locked rows", "error", "safe stop"])
 def test_each_broken_invariant_is_named_with_its_state(name: str) -> None:
     made = row()
@@ -312,6 +329,14 @@ def test_a_declaration_that_is_another_one_in_cvxpy_is_named(spoilt_by: float) -
     judge_declared(found, made, step, states().first(8), {}, answers)
     assert ("cvxpy answer" in found.violations) == bool(spoilt_by)
     assert not set(found.violations) - {"cvxpy answer", "cvxpy numbers"}
+
+
+def test_a_tiny_row_missed_by_less_than_the_tolerance_is_kept() -> None:
+    # At (0.5, 0.5) the row is 1e-9, its terms 3e-9.
+    qp = QP(H=np.eye(2), g=[0.0, 0.0], C=[[1e-9, 1e-9]], u=[1e-9 - 2e-14])
+    assert primal(qp, np.array([0.5, 0.5])) == (pytest.approx(2e-14, rel=1e-3), 0.0)
+    far = QP(H=np.eye(2), g=[0.0, 0.0], C=[[1e-9, 1e-9]], u=[0.0])
+    assert primal(far, np.array([0.5, 0.5])) == (pytest.approx(1e-9), pytest.approx(1.0 / 3.0))
 
 
 def test_a_step_that_takes_nan_is_named() -> None:
