@@ -30,6 +30,8 @@ AHEAD: Final = 0.1
 # Less than this to one side is no side [m or rad]: along self-motions that are singular all the way rounding would
 # choose, and differently from one tick to the next.
 UNDECIDED: Final = 1e-9
+# How far ahead the governor looks at the arm's own motion [s]: as long as the jerk limit takes to build up braking.
+BRAKING_AHEAD: Final = 0.06
 # |self-motion gradient| below which there is no way out worth going [1].
 FLAT: Final = 1e-2
 
@@ -129,6 +131,11 @@ def governor(tick: Tick, measured: Damping) -> tuple[ca.SX, ca.SX]:
     reduced until those for the locked rows alone take no more than the share `governor_share` of `qdd_max`, and those
     for all rows no more than all of it, judged at the joint velocity that the hand asks for, :math:`J^\# v`.
 
+    The arm's own velocity is another one where the hand's turns quickly or damping fades, and an arm that is too fast
+    when the rows become dependent can't brake in time. So the locked rows' accelerations are also judged where the last
+    command leads within `BRAKING_AHEAD`, at its velocity; beyond their share the hand's speed falls by the power 1.5 of
+    it, which the arm follows with a lag.
+
     Returns
     -------
     share : ca.SX, scalar
@@ -141,12 +148,16 @@ def governor(tick: Tick, measured: Damping) -> tuple[ca.SX, ca.SX]:
     x = ca.SX.sym("x", tick.nv)
     rows = [*tick.mode.free_rows, *tick.mode.fixed_rows]
     rate = ca.jtimes(matmul(tick.J[rows, :], x), tick.q, x)
-    rate = ca.substitute(rate, x, ca.densify(wanted))
+    moving, rate = rate, ca.substitute(rate, x, ca.densify(wanted))
     guided, locked, share2 = rate[: tick.m_free], ca.SX(tick.nv, 1), ca.SX(1)
     if tick.m_fixed:
         locked = tick.fixed.solve(rate[tick.m_free :])
         guided = guided - matmul(tick.J_free, locked)
         share2 = ca.fmin(1, allowed / (largest(ca.fabs(locked) / tick.qdd_max) + 1e-9))
+        soon = largest(ca.fabs(tick.fixed.solve(moving[tick.m_free :])) / tick.qdd_max)
+        there = ca.vertcat(tick.q + BRAKING_AHEAD * tick.qd_prev, tick.qd_prev)
+        soon = ca.substitute(soon, ca.vertcat(tick.q, x), there)
+        share2 = ca.fmin(share2, (allowed / (soon + 1e-9)) ** 3)
     whole = locked + matmul(tick.J_bar.T, matmul(measured.inverse, guided))
     needed = largest(ca.fabs(whole) / tick.qdd_max)
     share2 = ca.fmin(share2, 1 / (needed + 1e-9))

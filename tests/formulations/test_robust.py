@@ -181,6 +181,26 @@ def test_governor_leaves_enough_acceleration(robot: str, mode: str) -> None:
     assert slowed > 5
 
 
+@pytest.mark.parametrize(("robot", "mode"), [("ur5e", "line:z"), ("panda", "rcm:-0.12"), ("lbr_med14", "fix-position")])
+def test_governor_brakes_an_arm_that_will_be_too_fast_for_its_locked_rows(robot: str, mode: str) -> None:
+    """By finite differences of pinocchio's Jacobian, 60 ms ahead, at the arm's own velocity; the hand asks for little."""
+    rng, read = np.random.default_rng(8), Mode.parse(mode)
+    slowed = 0
+    for _ in range(60):
+        q, qd = arm(robot).random_configuration(rng), rng.normal(size=arm(robot).nv)
+        v = 1e-3 * rng.normal(size=read.m_free)
+        h = 1e-5
+        ahead = q + 0.06 * qd
+        after, before = (rows_at(arm(robot), read, ahead + side * h * qd)[1] for side in (1.0, -1.0))
+        _, fixed = rows_at(arm(robot), read, ahead)
+        keep = np.linalg.pinv(fixed) @ ((after - before) @ qd / (2.0 * h))
+        soon = np.abs(keep / arm(robot).qdd_max).max()
+        still, share = (ingredients(robot, mode)(q, v, velocity)[1] for velocity in (0.0 * qd, qd))
+        assert share == pytest.approx(min(still, (0.3 / soon) ** 1.5), rel=1e-5)
+        slowed += share < still
+    assert slowed > 5
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_without_its_parts_it_is_joint_space(mode: str) -> None:
     bare, plain = evaluator("panda", f"joint-space-robust({NOTHING})", mode), evaluator("panda", "joint-space", mode)
