@@ -1,7 +1,7 @@
 """Robust formulations on random paths: ``python -m kinqp.benchmarks.random_motion [--seed N] [ROBOT ...]``.
 
 Each closed loop runs the compiled step at 1 kHz; the table is one of docs/singularities.md. ROBOT is an arm as
-registered or ``FILE.urdf@TIP``; LBR Med 14 and UR5e unless told otherwise.
+registered, or `panda` with the optional package example-robot-data; LBR Med 14 and UR5e unless told otherwise.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.progress import track
 
 from ..codegen import compile_step
-from ..robots import load_robot
 from .conditions import conditions
+from .invariants import arm
 from .least_acceleration import OVER
 from .scenarios.disturbances import DISTURBANCES, Disturbance
 from .scenarios.random_paths import RANDOM_MODES, random_paths
@@ -90,8 +90,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0, help="of the first mode's paths; the next mode has the next one")
     given = parser.parse_args()
     console = Console(soft_wrap=True)
-    arms = [name.partition("@")[::2] for name in given.robots or (ROBOT, "ur5e")]
-    table = random_sweep([load_robot(name, tip=tip or None) for name, tip in arms], first_seed=given.seed)
+    table = random_sweep([arm(name) for name in given.robots or (ROBOT, "ur5e")], first_seed=given.seed)
     console.print(f"{table}\n", markup=False, highlight=False)
     console.print("; ".join(f"{k} {v}" for k, v in conditions().items()) + ".", markup=False, highlight=False)
 

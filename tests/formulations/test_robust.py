@@ -183,7 +183,7 @@ def test_governor_leaves_enough_acceleration(robot: str, mode: str) -> None:
 
 @pytest.mark.parametrize(("robot", "mode"), [("ur5e", "line:z"), ("panda", "rcm:-0.12"), ("lbr_med14", "fix-position")])
 def test_governor_brakes_an_arm_that_will_be_too_fast_for_its_locked_rows(robot: str, mode: str) -> None:
-    """By finite differences of pinocchio's Jacobian, 60 ms ahead, at the arm's own velocity; the hand asks for little."""
+    """By finite differences of pinocchio's Jacobian, 60 ms ahead, at the arm's velocity; the hand asks for little."""
     rng, read = np.random.default_rng(8), Mode.parse(mode)
     slowed = 0
     for _ in range(60):
