@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -100,15 +101,17 @@ def _show_again(console: Console, path: Path) -> None:
 
 def _table(most: Found, slowest: Found, median: float | None) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for head in ("", "iterations", "status", "time us", "of a typical tick", "active rows"):
+    for head in ("", "iterations", "status", "time us", "of a typical tick", "last accelerations", "active rows"):
         table.add_column(head)
     for name, found in (("most iterations", most), ("slowest tick", slowest)):
+        known = sum(map(isfinite, found.qdd_prev))
         table.add_row(
             name,
             str(found.iterations),
             found.status,
             "-" if found.seconds is None else f"{found.seconds * 1e6:.2f}",
             "-" if found.seconds is None or median is None else f"{found.seconds / median:.2f} x",
+            f"{known} of {len(found.qdd_prev)} known" if known else "unknown or not taken",
             ", ".join(found.active) or "none",
         )
     return table

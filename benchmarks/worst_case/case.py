@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -34,8 +35,9 @@ class Found:
 
     Attributes
     ----------
-    q, v, qd_prev : list of float
-        [rad or m], [m/s, rad/s], [rad/s or m/s]; `qd_prev` counts where the formulation takes it.
+    q, v, qd_prev, qdd_prev : list of float
+        [rad or m], [m/s, rad/s], [rad/s or m/s], [rad/s^2 or m/s^2]; the last two count where the formulation takes
+        them. Infinite in `qdd_prev`: unknown.
     limits : dict of str to list of float
         Run-time inputs in place of the robot's own limits.
     iterations : int
@@ -49,6 +51,7 @@ class Found:
     q: list[float]
     v: list[float]
     qd_prev: list[float]
+    qdd_prev: list[float]
     limits: dict[str, list[float]]
     iterations: int
     status: str
@@ -58,12 +61,13 @@ class Found:
     @classmethod
     def of(cls, step: CompiledStep, state: Batch, seconds: float | None) -> Found:
         """Describe a state, a batch of one."""
-        inputs = {**state.limits, **({"qd_prev": state.qd_prev[0]} if "qd_prev" in step.inputs else {})}
-        result = step(state.q[0], state.v[0], **inputs)
+        memory = {name: rows[0] for name, rows in state.memory(step).items()}
+        result = step(state.q[0], state.v[0], **state.limits, **memory)
         return cls(
             state.q[0].tolist(),
             state.v[0].tolist(),
             state.qd_prev[0].tolist(),
+            state.qdd_prev[0].tolist(),
             {name: np.asarray(values).tolist() for name, values in state.limits.items()},
             result.iterations,
             result.status.value,
@@ -74,7 +78,21 @@ class Found:
     def state(self) -> Batch:
         """Give the state, as a batch of one."""
         limits = {name: np.array(values) for name, values in self.limits.items()}
-        return Batch(np.array([self.q]), np.array([self.v]), np.array([self.qd_prev]), limits)
+        q, v, qd_prev, qdd_prev = (np.array([row]) for row in (self.q, self.v, self.qd_prev, self.qdd_prev))
+        return Batch(q, v, qd_prev, qdd_prev, limits)
+
+    @classmethod
+    def read(cls, given: dict[str, Any]) -> Found:
+        """Take what `written` gives; in files of earlier versions, which have no `qdd_prev`, it was unknown."""
+        rows = {name: _numbers(given[name]) for name in ("q", "v", "qd_prev")}
+        rows["qdd_prev"] = _numbers(given.get("qdd_prev", ["inf"] * len(rows["q"])))
+        limits = {name: _numbers(values) for name, values in given["limits"].items()}
+        return cls(**{**given, **rows, "limits": limits})
+
+    def written(self) -> dict[str, Any]:
+        """Describe it for JSON, which knows no infinity: as words they are read back as they were."""
+        rows = {name: _words(getattr(self, name)) for name in ("q", "v", "qd_prev", "qdd_prev")}
+        return {**asdict(self), **rows, "limits": {name: _words(values) for name, values in self.limits.items()}}
 
 
 @dataclass(frozen=True)
@@ -133,7 +151,9 @@ class Replayed:
 def write_case(case: WorstCase, path: Path) -> None:
     """Write a case as JSON, whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_whole(path, (json.dumps({"kind": _KIND, **asdict(case)}, indent=1) + "\n").encode())
+    both = {"most": case.most.written(), "slowest": case.slowest.written()}
+    text = json.dumps({"kind": _KIND, **asdict(case), **both}, indent=1, allow_nan=False)
+    write_whole(path, (text + "\n").encode())
 
 
 def read_case(path: Path) -> WorstCase:
@@ -148,7 +168,7 @@ def read_case(path: Path) -> WorstCase:
         given: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         if given.pop("kind") != _KIND:
             raise CaseError(f"{path}: expected a file that kinqp worst-case has written")
-        return WorstCase(**{**given, "most": Found(**given["most"]), "slowest": Found(**given["slowest"])})
+        return WorstCase(**{**given, "most": Found.read(given["most"]), "slowest": Found.read(given["slowest"])})
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise CaseError(f"{path}: expected a file that kinqp worst-case has written: {error}") from error
 
@@ -162,3 +182,11 @@ def replay(case: WorstCase) -> Replayed:
     return Replayed(
         Found.of(step, states[0], seconds[0]), Found.of(step, states[1], seconds[1]), float(np.median(seconds[2:]))
     )
+
+
+def _words(values: list[float]) -> list[float | str]:
+    return [x if isfinite(x) else str(x) for x in values]
+
+
+def _numbers(values: list[float | str]) -> list[float]:
+    return [float(x) for x in values]

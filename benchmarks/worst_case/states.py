@@ -1,4 +1,4 @@
-"""What is searched over: states, hands, last commands and limits as run-time inputs; drawn anew or near others."""
+"""What is searched over: states, hands, the tick before, limits as run-time inputs; drawn anew or near others."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+
+from .changes import Changes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,8 +34,9 @@ class Batch:
 
     Attributes
     ----------
-    q, qd_prev : ndarray, shape (N, nv)
-        [rad or m, .../s]; `qd_prev` counts where the step takes it.
+    q, qd_prev, qdd_prev : ndarray, shape (N, nv)
+        [rad or m, .../s, .../s^2]; `qd_prev` and `qdd_prev` count where the step takes them. Infinite in `qdd_prev`:
+        unknown.
     v : ndarray, shape (N, m_free)
         [m/s, rad/s].
     limits : mapping of str to ndarray
@@ -43,6 +46,7 @@ class Batch:
     q: Array
     v: Array
     qd_prev: Array
+    qdd_prev: Array
     limits: Limits = field(default_factory=dict)
 
     def __len__(self) -> int:
@@ -52,16 +56,21 @@ class Batch:
     def pick(self, index: int) -> Batch:
         """One of the states, as a batch."""
         one = slice(index, index + 1)
-        return Batch(self.q[one], self.v[one], self.qd_prev[one], self.limits)
+        return Batch(self.q[one], self.v[one], self.qd_prev[one], self.qdd_prev[one], self.limits)
 
     def repeated(self, copies: int) -> Batch:
         """The first state, over and over."""
-        q, v, qd_prev = (np.repeat(x[:1], copies, axis=0) for x in (self.q, self.v, self.qd_prev))
-        return Batch(q, v, qd_prev, self.limits)
+        rows = (self.q, self.v, self.qd_prev, self.qdd_prev)
+        q, v, qd_prev, qdd_prev = (np.repeat(x[:1], copies, axis=0) for x in rows)
+        return Batch(q, v, qd_prev, qdd_prev, self.limits)
 
     def inputs(self, step: CompiledStep) -> dict[str, Any]:
         """What `CompiledStep.batch` takes beyond state and hand."""
-        return {**self.limits, **({"qd_prev": self.qd_prev} if "qd_prev" in step.inputs else {})}
+        return {**self.limits, **self.memory(step)}
+
+    def memory(self, step: CompiledStep) -> dict[str, Array]:
+        """What the step takes of the tick before, a row for each state."""
+        return {name: getattr(self, name) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
 
 
 class Draws:
@@ -76,6 +85,8 @@ class Draws:
     def __init__(self, step: CompiledStep, rng: np.random.Generator) -> None:
         self._step: Final = step
         self._rng: Final = rng
+        # A stream of its own: all else is drawn as if there were no last accelerations.
+        self._changes: Final = Changes(step, rng.spawn(1)[0])
 
     def limits(self) -> Limits:
         """Draw limits: the robot's own, every other time; else tighter ones, down to a tenth, by joint."""
@@ -93,12 +104,18 @@ class Draws:
         return drawn
 
     def anywhere(self, count: int, limits: Limits) -> Batch:
-        """Draw states of all kinds: joints anywhere, near their limits down to 1e-12, some beyond them."""
+        """Draw states of all kinds: joints anywhere, near their limits down to 1e-12, some beyond them.
+
+        Where the step takes last accelerations, half of the ticks have ones, and commands, that keep the locked rows.
+        """
         rng, nv = self._rng, self._step.robot.nv
         low, high = self._range(limits)
         q = rng.uniform(low, high, (count, nv))
         q = self._snapped(q, limits, rng.random((count, 1)) * _NEAR_LIMIT * 2.0)
-        return Batch(q, self._hands(count), self._commands(count, limits), limits)
+        v, qd_prev = self._hands(count), self._commands(count, limits)
+        qdd_prev = self._changes.anywhere(count, limits)
+        qd_prev, qdd_prev = self._changes.consistent(q, qd_prev, qdd_prev, self._fastest(limits), limits)
+        return Batch(q, v, qd_prev, qdd_prev, limits)
 
     def near(self, one: Batch, count: int) -> Batch:
         """Draw states around one: moved by shares of the range from a third down to 1e-6, single parts drawn anew."""
@@ -115,7 +132,9 @@ class Draws:
         )
         fastest = self._fastest(one.limits)
         qd_prev = np.clip(one.qd_prev + scale * fastest * rng.normal(size=(count, nv)), -fastest, fastest)
-        return Batch(q, v, qd_prev, one.limits)
+        qdd_prev = self._changes.near(one.qdd_prev, scale, one.limits)
+        qd_prev, qdd_prev = self._changes.consistent(q, qd_prev, qdd_prev, fastest, one.limits)
+        return Batch(q, v, qd_prev, qdd_prev, one.limits)
 
     def _range(self, limits: Limits) -> tuple[Array, Array]:
         robot = self._step.robot
