@@ -101,17 +101,19 @@ def _show_again(console: Console, path: Path) -> None:
 
 def _table(most: Found, slowest: Found, median: float | None) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for head in ("", "iterations", "status", "time us", "of a typical tick", "last accelerations", "active rows"):
+    # Nothing is known where the formulation doesn't take them.
+    known = any(isfinite(x) for found in (most, slowest) for x in found.qdd_prev)
+    last = ["last acc. known"] if known else []
+    for head in ("", "iterations", "status", "time us", "of a typical tick", *last, "active rows"):
         table.add_column(head)
     for name, found in (("most iterations", most), ("slowest tick", slowest)):
-        known = sum(map(isfinite, found.qdd_prev))
         table.add_row(
             name,
             str(found.iterations),
             found.status,
             "-" if found.seconds is None else f"{found.seconds * 1e6:.2f}",
             "-" if found.seconds is None or median is None else f"{found.seconds / median:.2f} x",
-            f"{known} of {len(found.qdd_prev)} known" if known else "unknown or not taken",
+            *([f"{sum(map(isfinite, found.qdd_prev))} of {len(found.qdd_prev)}"] if known else []),
             ", ".join(found.active) or "none",
         )
     return table
