@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import settings
 
-from kinqp.control import (
-    GuidingController,
-    make_guiding,
-)
+from kinqp.control import GuidingController, make_guiding
 from kinqp.robots import load_robot
 
 ROBOT = load_robot("lbr_med14")

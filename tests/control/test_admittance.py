@@ -8,9 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from kinqp.control import (
-    GuidingSettings,
-)
+from kinqp.control import GuidingSettings
 from kinqp.formulations import Mode
 from tests.control.guided import DT, ROBOT, START, controller_with, guiding, quick
 

@@ -8,10 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from kinqp.control import (
-    GuidingSettings,
-    simulate_guiding,
-)
+from kinqp.control import GuidingSettings, simulate_guiding
 from kinqp.solvers import Status
 from tests.control.guided import DT, ROBOT, START, guiding, quick
 from tests.control.hands import Pull

@@ -7,10 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinqp.control import (
-    GuidingSettings,
-    simulate_guiding,
-)
+from kinqp.control import GuidingSettings, simulate_guiding
 from kinqp.formulations import InputError
 from kinqp.solvers import PluginError, Status
 from tests.control.guided import DT, ROBOT, START, controller_with, guiding, quick

@@ -5,13 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kinqp.control import (
-    GuidingController,
-    GuidingPhase,
-    GuidingSettings,
-    make_step,
-    simulate_guiding,
-)
+from kinqp.control import GuidingController, GuidingPhase, GuidingSettings, make_step, simulate_guiding
 from kinqp.formulations import InputError, Mode
 from kinqp.solvers import Status
 from tests.control.guided import DT, ROBOT, START, guiding
