@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from kinqp.control import make_step
 from kinqp.formulations import DATA, Mode, get_formulation, lower
 from kinqp.robots import RobotError
 from tests.formulations.acceleration_level import ARMS, MODES, NAMES, admissible, command, stretch
+from tests.formulations.least import least
 from tests.formulations.reference import adversarial_state, evaluator, rows_at
 from tests.robots.arms import arm
-
-if TYPE_CHECKING:
-    from kinqp.formulations import Instance
 
 
 @functools.cache
@@ -70,20 +66,6 @@ def test_stopping_is_feasible_from_100_000_states_each(name: str, robot: str, mo
     check_feasible(name, robot, mode, 10_000, torque_limits=True)
 
 
-def least_stretch(name: str, robot: str, mode: str, instance: Instance) -> float:
-    """Smallest stretch that the rows admit, by SciPy's LP."""
-    qp, at = instance.qp, evaluator(robot, name, mode).lowered.variables["stretch"].start
-    cost = np.zeros(qp.n)
-    cost[at] = 1.0
-    rows, sides = np.vstack((qp.C, -qp.C)), np.concatenate((qp.u, -qp.l))
-    kept = np.isfinite(sides)
-    equal = {"A_eq": qp.A, "b_eq": qp.b} if len(qp.b) else {}
-    box = list(zip(qp.lb, qp.ub, strict=True))
-    answer = linprog(cost, rows[kept], sides[kept], **equal, bounds=box, method="highs")
-    assert answer.status == 0
-    return float(answer.x[at])
-
-
 @pytest.mark.parametrize("name", NAMES[1:])
 def test_acceleration_limits_yield_no_more_than_they_must(name: str) -> None:
     """The penalty is exact: on admissible states the stretch is the smallest that there is, mostly zero."""
@@ -92,9 +74,9 @@ def test_acceleration_limits_yield_no_more_than_they_must(name: str) -> None:
         evaluate = evaluator(robot, name, mode)
         for q, qd, v in admissible(arm(robot), mode, 25, seed=8):
             instance = evaluate(q=q, v=v, qd_prev=qd)
-            least = least_stretch(name, robot, mode, instance)
-            assert stretch(name, robot, mode, instance) == pytest.approx(least, abs=1e-6)
-            needed += least > 1e-6
+            lowest = least(instance.qp, evaluate.lowered.variables["stretch"].start)
+            assert stretch(name, robot, mode, instance) == pytest.approx(lowest, abs=1e-6)
+            needed += lowest > 1e-6
     assert 0 < needed < 25
 
 
