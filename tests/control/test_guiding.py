@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,16 +16,21 @@ from tests.control.guided import DT, ROBOT, START, controller_with, guiding, qui
 from tests.control.hands import constant, smooth
 
 
+@functools.cache
+def through_three_modes():
+    """A run through three modes, a second each, in which the hand never lets go."""
+    return simulate_guiding(
+        guiding(["fix-orientation", "line:z", "fix-position"]),
+        smooth(0.0, 13.0, 5.0, 1.0, 0.0, 0.5),
+        START,
+        3.0,
+        schedule=[(1.0, lambda c: c.engage("line:z")), (2.0, lambda c: c.engage("fix-position"))],
+    )
+
+
 class TestModes:
     def test_engaged_and_left_without_a_jump(self):
-        controller = guiding(["fix-orientation", "line:z", "fix-position"])
-        run = simulate_guiding(
-            controller,
-            smooth(0.0, 13.0, 5.0, 1.0, 0.0, 0.5),
-            START,
-            3.0,
-            schedule=[(1.0, lambda c: c.engage("line:z")), (2.0, lambda c: c.engage("fix-position"))],
-        )
+        run = through_three_modes()
         modes = list(dict.fromkeys(str(mode) for mode in run.mode))
         assert modes == ["fix-orientation", "line:z", "fix-position"]
         # The hand never lets go. What it pulls on a mass at rest is the largest change of velocity there is:
@@ -37,14 +44,7 @@ class TestModes:
         assert set(run.status) == {Status.SOLVED}
 
     def test_locked_rows_do_not_move_in_any_mode(self):
-        controller = guiding(["fix-orientation", "line:z", "fix-position"])
-        run = simulate_guiding(
-            controller,
-            smooth(0.0, 13.0, 5.0, 1.0, 0.0, 0.5),
-            START,
-            3.0,
-            schedule=[(1.0, lambda c: c.engage("line:z")), (2.0, lambda c: c.engage("fix-position"))],
-        )
+        run = through_three_modes()
         for tick in range(0, len(run.t), 50):
             locked = list(run.mode[tick].fixed_rows)
             # Drift compensation alone moves them, by less than 0.1 mm/s here.
