@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from kinqp.benchmarks.invariants.states import StateSet
     from kinqp.control import InterpretedStep
 
-
 MODE = "fix-orientation"
 
 

@@ -17,7 +17,6 @@ from tests.formulations.reference import bounds_at
 if TYPE_CHECKING:
     from pathlib import Path
 
-
 # Of state 8 of seed 0, the first three of each: q, v, and qd_prev as parts of its bounds.
 PUBLISHED = (
     (1.5410122080874311, 1.1556775066275669, -2.073061636172432),
