@@ -1,8 +1,9 @@
 """A formulation on a robot as C: generating it, compiling and loading it, exporting it."""
 
+from .compile_step import compile_step
 from .definite import CurvatureError
 from .export import ExportError, export_c
 from .results import BatchResult, TickResult
-from .step import CompiledStep, compile_step
+from .step import CompiledStep
 
 __all__ = ["BatchResult", "CompiledStep", "CurvatureError", "ExportError", "TickResult", "compile_step", "export_c"]

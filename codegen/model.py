@@ -14,6 +14,7 @@ from .emit import emit, needed_for
 from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
 from .kernels import KERNELS, agree, locked_array, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
+from .shape import Shape, identical
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,48 +29,6 @@ _PADDED: Final = ("A", "J")
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
 _LATE: Final = ("C", "start")
-
-
-@dataclass(frozen=True)
-class Shape:
-    """What is known of a mode's QP whatever the numbers, and saves work in its code.
-
-    Attributes
-    ----------
-    diagonal : bool
-        H is diagonal and there is neither gradient nor equality: without rows the answer is zero.
-    gradient : bool
-        There is a gradient.
-    start : bool
-        A feasible point was declared.
-    direct_rows : bool
-        Row i bounds variable i and nothing else.
-    direct_command : bool
-        The command is x itself.
-    same : bool
-        The command moves with x as the rows do: K = C.
-    """
-
-    diagonal: bool
-    gradient: bool
-    start: bool
-    direct_rows: bool
-    direct_command: bool
-    same: bool
-
-    @classmethod
-    def of(cls, reduced: Reduced) -> Shape:
-        """Look at a QP."""
-        gradient = not reduced.g.is_zero()
-        one = ca.SX.eye(reduced.n)
-        return cls(
-            diagonal=reduced.diagonal and not gradient and not reduced.m_eq,
-            gradient=gradient,
-            start=bool(reduced.start.size1()),
-            direct_rows=_identical(reduced.C, one),
-            direct_command=_identical(reduced.K, one) and reduced.k.is_zero(),
-            same=_identical(reduced.K, reduced.C),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,11 +228,6 @@ def _brake_body(lowered: Lowered) -> tuple[str, ...]:
     return tuple(emit(function, list(sources.values()), ["qd"]))
 
 
-def _identical(a: ca.SX, b: ca.SX) -> bool:
-    # Of two expressions that are one, CasADi knows the difference.
-    return a.shape == b.shape and bool((a - b).is_zero())
-
-
 def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lowered, Reduced]:
     """Lower with cuts, unless the declaration looks through one: a derivative doesn't see what lies behind a symbol."""
     plain, cut = lower(formulation, robot, mode), lower(formulation, robot, mode, cut=True)
@@ -317,6 +271,6 @@ def _aliases(outputs: dict[str, ca.SX], layouts: dict[str, Layout], cuts: Sequen
                 # A single column and a single row stand alike.
                 given = value.T if value.size1() == 1 and layout == "columns" and layouts[name] == "rows" else value
                 same = layouts[name] == layout or given is not value
-                if same and layout != "plain" and _identical(given, symbol):
+                if same and layout != "plain" and identical(given, symbol):
                     found[name] = f"{cut.kernel}_{k}"
     return found

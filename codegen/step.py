@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..formulations import Hierarchy, InputError, Mode, check_input, get_formulation
+from ..formulations import InputError, check_input
 from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Formulation, Input
+    from ..formulations import Formulation, Input, Mode
     from ..robots import Robot
     from .model import StepCode
 
@@ -29,7 +29,12 @@ if TYPE_CHECKING:
     Integers = NDArray[np.intc]
 
 SOLVER: Final = "active-set"
-SOLVERS: Final = (SOLVER, qrqp.NAME)
+# All that the processor has, but the bits of any other machine: nothing is fused, and the compiler makes no vectors of
+# its own, in which gcc would fuse all the same. The sources bring theirs.
+STEP_FLAGS: Final = (
+    *("-std=c99", "-O3", NATIVE, "-fno-tree-vectorize", "-ffp-contract=off", "-fno-math-errno"),
+    *("-fPIC", "-shared", "-lm"),
+)
 _NONE: Final = np.zeros(0)
 _DOUBLE: Final = np.dtype(np.float64)
 _new: Final = tuple.__new__
@@ -273,66 +278,3 @@ class CompiledStep:
         address = self._ffi.addressof(self._parameters[0], name)
         size = self._ffi.sizeof(self._ffi.typeof(address).item)
         return np.frombuffer(self._ffi.buffer(address, size), dtype=np.float64)
-
-
-def compile_step(
-    robot: Robot,
-    formulation: str | Formulation,
-    mode: str | Mode,
-    solver: str = SOLVER,
-    *,
-    feasible: bool = False,
-    max_iterations: int | None = None,
-) -> CompiledStep:
-    """Compile the control cycle of a formulation on a robot in a mode.
-
-    The first time this takes some seconds of the system's C compiler; after that the library is found in a cache by its
-    content.
-
-    Parameters
-    ----------
-    robot : Robot
-        From `load_robot`.
-    formulation : str or Formulation
-        A registered name, `module:Name`, or an instance.
-    mode : str or Mode
-        As in `Mode.parse`, or an instance.
-    solver : {"active-set", "casadi-qrqp"}
-        The solver in the C code: our own, or the one that CasADi generates, to compare with. That tells no iterations
-        (-1) and takes neither `feasible` nor `max_iterations`.
-    feasible, max_iterations
-        See `CompiledStep`.
-
-    Raises
-    ------
-    ValueError
-        When the solver has no C counterpart.
-    CompilerError
-        When there is no C compiler, or it fails.
-    """
-    if solver not in SOLVERS:
-        known = ", ".join(SOLVERS)
-        raise ValueError(f"solver: expected one that is generated as C ({known}), got {solver!r}; see make_step")
-    if solver == qrqp.NAME and (feasible or max_iterations is not None):
-        raise ValueError(f"feasible, max_iterations: expected neither with {solver}, which doesn't take them")
-    made = get_formulation(formulation)
-    if solver == qrqp.NAME and isinstance(made, Hierarchy):
-        raise ValueError(f"solver: expected {SOLVER} for {made.name}, which is several QPs in order, got {solver!r}")
-    if solver == qrqp.NAME and made.safe_stop != "zero":
-        raise ValueError(f"solver: expected {SOLVER} for {made.name}, whose safe stop is braking, got {solver!r}")
-    return CompiledStep(
-        robot,
-        made,
-        Mode.parse(mode) if isinstance(mode, str) else mode,
-        solver,
-        feasible=feasible,
-        max_iterations=max_iterations,
-    )
-
-
-# All that the processor has, but the bits of any other machine: nothing is fused, and the compiler makes no vectors of
-# its own, in which gcc would fuse all the same. The sources bring theirs.
-STEP_FLAGS: Final = (
-    *("-std=c99", "-O3", NATIVE, "-fno-tree-vectorize", "-ffp-contract=off", "-fno-math-errno"),
-    *("-fPIC", "-shared", "-lm"),
-)

@@ -31,7 +31,8 @@ from .registry import available_formulations, get_formulation, with_constraints
 from .result import StepResult, one_by_one
 from .spy import PlotError
 from .task_scaling import TaskScaling
-from .tick import DEFAULT_DT, Input, Tick
+from .tick import Tick
+from .tick_inputs import DEFAULT_DT, Input
 
 __all__ = [
     "ABOVE",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .base import Formulation
     from .lowering import Lowered
     from .modes import Mode
-    from .tick import Input
+    from .tick_inputs import Input
 
 _MANY: Final = 8
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from ..solvers import Solution
-    from .tick import Input
+    from .tick_inputs import Input
 
     Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from .modes import Mode
-    from .tick import Input
+    from .tick_inputs import Input
 
     Array = NDArray[np.float64]
 

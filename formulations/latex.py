@@ -12,6 +12,7 @@ import numpy as np
 from ..robots import RobotError
 from .blocks import constant, multiple_of_identity, split, split_rows
 from .tick import Tick
+from .tick_inputs import TickInputs
 
 if TYPE_CHECKING:
     from .lowering import Lowered
@@ -163,7 +164,7 @@ def _sign(value: ca.SX, known: ca.SX) -> str | None:
 def _quantities(lowered: Lowered) -> dict[str, ca.SX]:
     """Inputs and quantities of the tick, dense, by name."""
     found = {given.name: given.symbol for given in lowered.inputs}
-    for name, attribute in vars(Tick).items():
+    for name, attribute in (vars(TickInputs) | vars(Tick)).items():
         if not name.startswith("_") and isinstance(attribute, property | cached_property):
             with suppress(RobotError):  # an arm without inertias has no mass matrix
                 quantity = getattr(lowered.tick, name)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..robots import Robot
     from .base import Formulation
     from .modes import Mode
-    from .tick import Input
+    from .tick_inputs import Input
 
 DATA: Final = ("H", "g", "A", "b", "C", "l", "u", "lb", "ub", "K", "k", "x_feasible")
 # Operations that CasADi differentiates to a constant although they are not affine.

@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from typing import TYPE_CHECKING, Any, Final
 
 from ..conditions import conditions
+from ..store import write_whole
 from .blocks import Block, run_block
 from .tally import Row
 
@@ -60,7 +61,8 @@ def run(
 
     def keep(block: Block, rows: list[Row]) -> None:
         nonlocal done
-        _write_whole(_path(out, block), json.dumps([row.model_dump(mode="json") for row in rows], indent=1))
+        content = json.dumps([row.model_dump(mode="json") for row in rows], indent=1) + "\n"
+        write_whole(_path(out, block), content.encode())
         done += 1
         if on_progress is not None:
             on_progress(done, len(blocks), f"{block.formulation}, {block.robot}, {block.mode}")
@@ -108,7 +110,8 @@ def _begin(blocks: Sequence[Block], out: Path, *, resume: bool) -> None:
                 raise InvariantsError(f"{out} was run with {name} {stored[name]}, and this is {value}: give the same")
         return
     (out / "blocks").mkdir(parents=True, exist_ok=True)
-    _write_whole(manifest, json.dumps({**wanted, "conditions": conditions()}, indent=1))
+    content = json.dumps({**wanted, "conditions": conditions()}, indent=1) + "\n"
+    write_whole(manifest, content.encode())
 
 
 def _path(out: Path, block: Block) -> Path:
@@ -116,9 +119,3 @@ def _path(out: Path, block: Block) -> Path:
     # Two names may become one in a file name; what tells them apart is kept in the hash.
     key = hashlib.sha256(text.encode()).hexdigest()[:8]
     return out / "blocks" / f"{re.sub(r'[^A-Za-z0-9_.-]+', '-', text)[:120]}-{key}.json"
-
-
-def _write_whole(path: Path, text: str) -> None:
-    temporary = path.with_suffix(".partial")
-    temporary.write_text(text + "\n", encoding="utf-8")
-    temporary.replace(path)

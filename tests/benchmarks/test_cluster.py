@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from kinqp.benchmarks import ClusterError, sweep
-from tests.benchmarks.test_sweep import TINY, same_accuracy
+from tests.benchmarks.sweeps import TINY, same_accuracy
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

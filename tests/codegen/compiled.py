@@ -75,6 +75,11 @@ def compiled(
         return CompiledStep(arm(robot), chosen, Mode.parse(mode), feasible=feasible, max_iterations=max_iterations)
 
 
+def everything() -> CompiledStep:
+    """Return the step of `Everything` on the UR5e."""
+    return compiled("ur5e", Everything.name, "fix-orientation", quick=True)
+
+
 @functools.cache
 def interpreted(robot: str, formulation: str, mode: str) -> InterpretedStep:
     """Return the same step without generated code."""

@@ -16,6 +16,7 @@ from kinqp.solvers import Status
 from tests.codegen.compiled import compiled, interpreted, near
 from tests.codegen.test_parity import weakest_locked, with_limits
 from tests.control.states import states
+from tests.formulations.acceleration_level import MODES, NAMES
 from tests.formulations.reference import bounds_at, rows_at
 from tests.robots.arms import arm
 
@@ -28,13 +29,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-NAMES = (
-    "cartesian-error-acceleration",
-    "joint-space-acceleration",
-    "minimum-acceleration-norm",
-    "minimum-torque-norm",
-)
-MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
 NARROW = 2.0
 # Compiled and interpreted are to agree to 1e-9; a last command that contradicts the locked rows by 1 rad/s, as in these
 # tests, makes multipliers of 1e4 and more beside a joint weight of 1e-4. The compiled step, which doesn't refine, is

@@ -3,7 +3,6 @@
 import functools
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +20,7 @@ from kinqp.formulations import Mode, get_formulation
 from kinqp.solvers.native import build_library
 from tests.codegen.compiled import FORMULATIONS, SPEEDS, Everything, build_all, code, compiled, near, sources
 from tests.formulations.reference import MODES
+from tests.programs import need, run
 from tests.robots.arms import arm
 
 Array = NDArray[np.float64]
@@ -31,19 +31,6 @@ DRIVER = Path(__file__).with_name("generated_driver.c")
 ALLOWED = {"sin", "cos", "sincos", "sqrt", "fmin", "fmax", "memset", "memcpy", "memmove", "__stack_chk_fail"}
 
 compilers = pytest.mark.parametrize("compiler_name", ["gcc", "clang"])
-
-
-def need(tool: str) -> str:
-    path = shutil.which(tool)
-    if path is None:
-        pytest.skip(f"{tool} is not installed")
-    return path
-
-
-def run(*command: str | Path, cwd: Path) -> str:
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
 
 
 @functools.cache

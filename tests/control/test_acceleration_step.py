@@ -15,6 +15,7 @@ from kinqp.formulations import InputError, Mode, get_formulation
 from kinqp.robots import load_robot
 from kinqp.solvers import QP, RawSolution, Solver, Status, get_solver
 from tests.control.states import states
+from tests.formulations.acceleration_level import MODES, NAMES
 from tests.formulations.reference import bounds_at, rows_at
 from tests.robots.arms import arm
 
@@ -23,13 +24,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-NAMES = (
-    "cartesian-error-acceleration",
-    "joint-space-acceleration",
-    "minimum-acceleration-norm",
-    "minimum-torque-norm",
-)
-MODES = ("free", "position", "fix-orientation", "fix-position", "line:z", "plane:0,0,1", "rcm:0.1")
 # Interior-point solvers lose digits where locked rows become dependent, near q = 0, as at velocity level.
 LEAST_SOLVED = {"active-set": 1.0, "clarabel": 0.9, "piqp": 0.85}
 

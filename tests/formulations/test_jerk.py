@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from kinqp.formulations import JointSpaceRobust, Mode
 from kinqp.formulations.rate import JERK_TIME
 from kinqp.solvers import Status, solve
+from tests.formulations.least import least
 from tests.formulations.reference import evaluator, null_projector, rows_at
 from tests.robots.arms import arm
 
@@ -67,18 +67,10 @@ def test_comfort_yields_before_the_acceleration_limit(name: str) -> None:
             qp = evaluate(q=q, v=v, qd_prev=qd_prev, qdd_prev=qdd_prev, **limits).qp
             solution = solve(qp)
             assert solution.status is Status.SOLVED
-            cost = np.zeros(qp.n)
-            cost[columns[0]] = 1.0
-            rows, sides = np.vstack((qp.C, -qp.C)), np.concatenate((qp.u, -qp.l))
-            real = np.isfinite(sides)
-            least = linprog(
-                cost, A_ub=rows[real], b_ub=sides[real], A_eq=qp.A if qp.m_eq else None, b_eq=qp.b if qp.m_eq else None,
-                bounds=list(zip(qp.lb, qp.ub, strict=True)), method="highs",
-            )  # fmt: skip
-            assert least.status == 0
+            lowest = least(qp, columns[0])
             excess, haste = solution.x[columns]
-            assert -1e-6 * (1.0 + least.fun) < excess - least.fun < 5e-3
-            above += excess - least.fun > 1e-6 * (1.0 + least.fun)
+            assert -1e-6 * (1.0 + lowest) < excess - lowest < 5e-3
+            above += excess - lowest > 1e-6 * (1.0 + lowest)
             over += excess > 1e-6
             hasty += haste > 1e-6 and excess < 1e-9
     assert above <= 2

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 from kinqp.solvers import QP, Status, get_solver
 from kinqp.solvers.active_set import fixed_size_sources, sources
 from kinqp.solvers.catalogue import CATALOGUE
+from tests.programs import need, run
 from tests.solvers.random_problems import draw
 
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-ffp-contract=off"]
@@ -23,19 +23,6 @@ DRIVER = Path(__file__).with_name("active_set_driver.c")
 FIELDS = ("H", "g", "A", "b", "C", "l", "u", "lb", "ub")
 
 compilers = pytest.mark.parametrize("compiler", ["gcc", "clang"])
-
-
-def need(tool: str) -> str:
-    path = shutil.which(tool)
-    if path is None:
-        pytest.skip(f"{tool} is not installed")
-    return path
-
-
-def run(*command: str | Path, cwd: Path) -> str:
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, f"{command}\n{done.stdout}\n{done.stderr}"
-    return done.stdout
 
 
 @pytest.fixture

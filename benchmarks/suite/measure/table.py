@@ -3,6 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 
 @dataclass
@@ -36,3 +44,13 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
         "| " + " | ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)) + " |"
         for row in (head, rule, *rows)
     )
+
+
+def median(values: Array) -> float:
+    """Return the median as a number."""
+    return float(np.median(values))
+
+
+def spread(ratios: Array) -> str:
+    """Write the range of ratios, to stand behind their median."""
+    return f" ({ratios.min():.3f}-{ratios.max():.3f})"
