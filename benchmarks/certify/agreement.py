@@ -97,7 +97,8 @@ def compare(
                 continue
             compared += 1
             if tick.iterations != region.iterations:
-                steps, _ = follow(slice_.method, rounded(met), TOLERANCE)
+                whole = rounded(met)
+                steps, _ = follow(slice_.method(whole), whole, TOLERANCE)
                 tolerated += tick.iterations == steps
                 differing += tick.iterations != steps
         untouched += compared == before
