@@ -51,7 +51,7 @@ def run_certify(
     seed: Annotated[int, typer.Option(min=0, help="Of these.")] = 0,
     speed: Annotated[float, typer.Option(help="Most that the hand asks for along each axis [m/s, rad/s].")] = 3.0,
     any_hand: Annotated[
-        bool, typer.Option("--any-hand", help="Whatever the hand asks for, and any common factor of all bounds.")
+        bool, typer.Option("--any-hand", help="Whatever the hand asks for, in place of --speed.")
     ] = False,
     free: Annotated[
         list[str] | None, typer.Option(help="Side of a joint with any bound, as 3:lower; may be repeated.")

@@ -13,7 +13,7 @@ from .certificate import (
 from .cone import Condition, Decider, Tally
 from .enumeration import Enumeration, Region, enumerate_paths, follow
 from .method import DependentRowsError, DualMethod
-from .slices import Slice, SliceError, every_bound, parse_side
+from .slices import Piece, Slice, SliceError, every_bound, parse_side
 from .states import drawn_states, read_state
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "DependentRowsError",
     "DualMethod",
     "Enumeration",
+    "Piece",
     "Region",
     "Slice",
     "SliceError",

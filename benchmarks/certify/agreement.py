@@ -43,8 +43,8 @@ class Agreement:
     near : int
         Ticks left out, nearer than `NEAR` to where their region ends.
     refused : int
-        Ticks that the compiled code did not call solved, with zero motion as its command: it does where rounding could
-        break a bound, as for a hand of 1e5 m/s.
+        Ticks that the compiled code did not call solved, with zero motion as its command: it does where `TOLERANCE`, or
+        rounding, is more than the 1e-9 rad/s that bounds are checked to, as for hands of hundreds of m/s.
     untouched : int
         Regions of which no tick could be compared: nowhere are they wider than that.
     """
@@ -97,7 +97,8 @@ def compare(
                 continue
             compared += 1
             if tick.iterations != region.iterations:
-                steps, _ = follow(slice_.method, rounded(met), TOLERANCE)
+                whole = rounded(met)
+                steps, _ = follow(slice_.method(whole), whole, TOLERANCE)
                 tolerated += tick.iterations == steps
                 differing += tick.iterations != steps
         untouched += compared == before

@@ -18,7 +18,7 @@ from ..store import write_whole
 from ..worst_case.case import CaseError
 from .agreement import Agreement, compare
 from .cone import rounded
-from .enumeration import enumerate_paths, follow
+from .enumeration import follow
 from .exact import direction
 from .slices import Slice
 
@@ -67,7 +67,7 @@ class Certificate:
     free : list of str
         Sides whose bound is a parameter, as 3:lower.
     speed : float or None
-        Of the hand, at most, along each axis [m/s, rad/s]; None: any, and any common factor of all bounds.
+        Of the hand, at most, along each axis [m/s, rad/s]; None: any.
     iterations : int
         No theta of the slice takes more, ties and all.
     attained : Attained
@@ -144,7 +144,7 @@ def certify(
         When rounding would decide.
     """
     start = process_time()
-    found = enumerate_paths(slice_.method, slice_.given, on_progress)
+    found = slice_.enumerate(on_progress)
     seconds = process_time() - start
     worst = found.worst
     v, inputs = slice_.inputs(direction(worst.theta))
@@ -181,7 +181,8 @@ def attained_again(found: Certificates) -> list[tuple[int, int]]:
     for each in found.certificates:
         q, v = np.array(each.q), np.array(each.attained.v)
         limits = {name: np.array(values) for name, values in each.attained.limits.items()}
-        exact, _ = follow(Slice(interpreted, q, limits).method, rounded(np.append(v, 1.0)))
+        theta = rounded(np.append(v, 1.0))
+        exact, _ = follow(Slice(interpreted, q, limits).method(theta), theta)
         counts.append((compiled(q, v, **limits).iterations, exact))
     return counts
 

@@ -6,7 +6,7 @@ of them, or some of the a, with positive weights and a strict one among them, ad
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 from math import lcm
 from typing import TYPE_CHECKING, Final
@@ -76,6 +76,10 @@ class Tally:
     refuted: int = 0
     again: int = 0
     simplex: int = 0
+
+    def __add__(self, other: Tally) -> Tally:
+        """Sum of both."""
+        return Tally(*(mine + its for mine, its in zip(astuple(self), astuple(other), strict=True)))
 
 
 class Decider:

@@ -86,6 +86,14 @@ class _Node:
     theta: Form
 
 
+def united(parts: Sequence[Enumeration]) -> Enumeration:
+    """Give the regions of several enumerations as one: those of different pieces of a slice."""
+    tally = Tally()
+    for part in parts:
+        tally += part.tally
+    return Enumeration(tuple(region for part in parts for region in part.regions), tally)
+
+
 def enumerate_paths(
     method: DualMethod,
     given: Sequence[Condition],
@@ -158,7 +166,8 @@ def follow(method: DualMethod, theta: Form, tolerance: float = 0.0) -> tuple[int
     method : DualMethod
     theta : tuple of int
     tolerance : float
-        Rows hold if no farther away than this share of |v|, as in the C code [-].
+        Rows hold if no farther away than this share of |v|, as in the C code once a row has entered: whether one has
+        to is asked without a tolerance there [-].
 
     Raises
     ------
@@ -173,6 +182,6 @@ def follow(method: DualMethod, theta: Form, tolerance: float = 0.0) -> tuple[int
         taken = next(each for each in options if all(condition.holds(theta) for condition in each.conditions))
         if taken.steps == 0 and taken.entering is None:
             return steps, active
-        if not taken.steps and taken.entering and method.distance(active, taken.entering, theta) <= tolerance:
+        if steps and not taken.steps and taken.entering and method.distance(active, taken.entering, theta) <= tolerance:
             return steps, active
         active, entering, steps = taken.active, taken.entering, steps + taken.steps

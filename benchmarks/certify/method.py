@@ -79,13 +79,19 @@ class DualMethod:
         J#; rows of zeros never take part.
     low, high : ndarray, shape (nv, k)
         qd_lo = low s and qd_hi = high s, for k numbers s; theta = (v, s).
+    widening : ndarray, shape (m_free + k,), optional
+        By which both are wider, times theta; nothing unless told otherwise.
     """
 
-    def __init__(self, M: Array, low: Array, high: Array) -> None:
+    def __init__(self, M: Array, low: Array, high: Array, widening: Array | None = None) -> None:
         self.nv, self.m_free = M.shape
-        whole, _ = integers(np.hstack([M, low, high]))
-        split = np.split(whole, [self.m_free, self.m_free + low.shape[1]], axis=1)
-        self._M, self._low, self._high = (part.tolist() for part in split)
+        size = self.m_free + low.shape[1]
+        wider = np.zeros(size) if widening is None else widening
+        whole, _ = integers(np.concatenate([M.ravel(), low.ravel(), high.ravel(), wider]))
+        ends = np.cumsum([M.size, low.size, high.size])
+        matrix, below, above, form = np.split(whole, ends)
+        self._M, self._low, self._high = (part.reshape(self.nv, -1).tolist() for part in (matrix, below, above))
+        self._widening: list[int] = form.tolist()
         self._squares = [dot(row, row) for row in self._M]
         self._per_length = reciprocal_lengths(self._squares)
         self._sides: list[Side] = [(i, sign) for i in range(self.nv) if self._squares[i] for sign in (-1, 1)]
@@ -133,7 +139,8 @@ class DualMethod:
         """Bound of p'w >= bound, in theta."""
         row, sign = side
         limits = self._low if sign < 0 else self._high
-        return tuple(sign * entry for entry in self._M[row]) + tuple(-sign * entry for entry in limits[row])
+        narrow = (*(sign * entry for entry in self._M[row]), *(-sign * entry for entry in limits[row]))
+        return tuple(entry - wider for entry, wider in zip(narrow, self._widening, strict=True))
 
     def _face(self, active: Sides) -> _Face:
         if active not in self._faces:

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ...formulations import CartesianError
-from .cone import Condition
+from ...formulations.inverse import INVERSE_ROUNDING, WIDEST
+from .cone import Condition, Decider
+from .enumeration import Enumeration, enumerate_paths, united
+from .exact import direction
 from .method import DualMethod
 from .reach import reach
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
     from ...control import InterpretedStep
+    from .exact import Form
     from .method import Side
 
     Array = NDArray[np.float64]
@@ -47,12 +52,33 @@ def parse_side(text: str, nv: int) -> Side:
 
 
 @dataclass(frozen=True, eq=False)
+class Piece:
+    """Theta of a slice for which the bounds are linear in theta: the hand's signs are the same.
+
+    Attributes
+    ----------
+    method : DualMethod
+        The active set on these problems.
+    given : tuple of Condition
+        Which theta there are; no other piece of the slice holds any of them.
+    """
+
+    method: DualMethod
+    given: tuple[Condition, ...]
+
+    def holds(self, theta: Form) -> bool:
+        """Whether a theta belongs to it, exactly."""
+        return all(condition.holds(theta) for condition in self.given)
+
+
+@dataclass(frozen=True, eq=False)
 class Slice:
-    """The problems minimise 1/2 |w|^2 subject to qd_lo <= M (v + w) <= qd_hi of one M.
+    """The problems minimise 1/2 |w|^2 subject to qd_lo - r <= M (v + w) <= qd_hi + r of one M.
 
     theta = (v, s, b): the hand [m/s, rad/s], a factor of all bounds, and the bounds of the free sides. Only its
     direction counts, since v, bounds and answer scale together. At s = 1 the bounds of all other sides are the state's
-    own. What the declaration widens them by for J#'s rounding (`rounding_of_inverse`) is left out, as rounding is.
+    own. r is what the declaration widens them by for J#'s rounding (`rounding_of_inverse`): in proportion to
+    |v_1| + ... + |v_m|, and no more than `WIDEST` s. That is linear where no v_i changes its sign: in each `Piece`.
 
     Attributes
     ----------
@@ -66,8 +92,7 @@ class Slice:
         Joints and sides (-1 lower, +1 upper) whose bound may be anything from 0 to the joint's velocity limit, as if
         its position limit stood anywhere from here to far away.
     speed : float or None
-        Largest speed of the hand along each of its axes, where bounds are as they are [m/s, rad/s]; None: any, and
-        with it any common factor of the bounds.
+        Largest speed of the hand along each of its axes, where bounds are as they are [m/s, rad/s]; None: any.
     """
 
     step: InterpretedStep
@@ -110,19 +135,59 @@ class Slice:
         return self._instance.qd_lo, self._instance.qd_hi
 
     @cached_property
-    def method(self) -> DualMethod:
-        """The active set on these problems."""
+    def pieces(self) -> tuple[Piece, ...]:
+        """Parts, by the hand's signs and by whether bounds are as wide as they get; each theta is in one."""
+        m, size = self.step.mode.m_free, self.step.mode.m_free + 1 + len(self.free)
+        most, found = _form(size, {m: WIDEST}), []
+        for signs in product((1.0, -1.0), repeat=m):
+            # Zero is taken for positive.
+            here = [_condition(size, {axis: sign}, strict=sign < 0.0) for axis, sign in enumerate(signs)]
+            wider = _form(size, {axis: INVERSE_ROUNDING * sign for axis, sign in enumerate(signs)})
+            slower, faster = Condition.exactly(most - wider, strict=False), Condition.exactly(wider - most, strict=True)
+            found.append(Piece(self._widened(wider), (*self._given, *here, slower)))
+            beyond = (*self._given, *here, faster)
+            if Decider().witness((), beyond) is not None:  # else no hand of the slice is that fast
+                found.append(Piece(self._widened(most), beyond))
+        return tuple(found)
+
+    def enumerate(self, on_progress: Callable[[int, int, float], None] | None = None) -> Enumeration:
+        """Follow every path of every piece; arguments and errors as of `enumerate_paths`."""
+        parts: list[Enumeration] = []
+        for piece in self.pieces:
+
+            def told(regions: int, most: int, share: float, before: tuple[Enumeration, ...] = tuple(parts)) -> None:
+                if on_progress is not None:
+                    known = sum(len(part.regions) for part in before)
+                    most = max([most, *(part.iterations for part in before)])
+                    on_progress(known + regions, most, (len(before) + share) / len(self.pieces))
+
+            parts.append(enumerate_paths(piece.method, piece.given, told))
+        return united(parts)
+
+    def method(self, theta: Form) -> DualMethod:
+        """Give the active set on the problems of a theta's piece.
+
+        Raises
+        ------
+        SliceError
+            When it belongs to none, as where the hand is faster than `speed`.
+        """
+        for piece in self.pieces:
+            if piece.holds(theta):
+                return piece.method
+        raise SliceError(f"theta: expected one of the slice, got the direction {direction(theta)}")
+
+    def _widened(self, widening: Array) -> DualMethod:
         columns = 1 + len(self.free)
         low, high = (np.hstack([side[:, None], np.zeros((side.size, columns - 1))]) for side in self.bounds)
         for k, (joint, sign) in enumerate(self.free):
             side = low if sign < 0 else high
             side[joint] = 0.0
             side[joint, 1 + k] = sign
-        return DualMethod(self.M, low, high)
+        return DualMethod(self.M, low, high, widening)
 
     @cached_property
-    def given(self) -> tuple[Condition, ...]:
-        """Which theta there are."""
+    def _given(self) -> tuple[Condition, ...]:
         m = self.step.mode.m_free
         size = m + 1 + len(self.free)
         found = [_condition(size, {m: 1.0}, strict=True)]
@@ -160,10 +225,14 @@ class Slice:
         return np.array([*v, 1.0, *bounds])
 
 
-def _condition(size: int, entries: Mapping[int, float], *, strict: bool = False) -> Condition:
+def _form(size: int, entries: Mapping[int, float]) -> Array:
     values = np.zeros(size)
     values[list(entries)] = list(entries.values())
-    return Condition.exactly(values, strict=strict)
+    return values
+
+
+def _condition(size: int, entries: Mapping[int, float], *, strict: bool = False) -> Condition:
+    return Condition.exactly(_form(size, entries), strict=strict)
 
 
 def every_bound(M: Array) -> tuple[DualMethod, tuple[Condition, ...]]:

@@ -118,13 +118,13 @@ def test_regions_hold_every_hand_once_and_the_compiled_tick_agrees(
     interpreted: InterpretedStep, compiled: CompiledStep
 ) -> None:
     slice_ = Slice(interpreted, Q, speed=1.0)
-    found = enumerate_paths(slice_.method, slice_.given)
+    found = slice_.enumerate()
     rng = np.random.default_rng(0)
     for v in rng.uniform(-1.0, 1.0, (150, 3)) * 10.0 ** rng.uniform(-3, 0, (150, 1)):
         theta = rounded(np.append(v, 1.0))
         at = [region for region in found.regions if all(condition.holds(theta) for condition in region.conditions)]
         assert len(at) == 1
-        assert follow(slice_.method, theta) == (at[0].iterations, at[0].active)
+        assert follow(slice_.method(theta), theta) == (at[0].iterations, at[0].active)
         tick = compiled(Q, v)
         assert tick.iterations == at[0].iterations <= found.iterations
         sides = {f"joint limits[{row}] {'lower' if sign < 0 else 'upper'}" for row, sign in at[0].active}
@@ -148,26 +148,14 @@ def test_a_certificate_is_attained_and_holds_in_every_region(
 def test_free_bounds_are_met_through_position_limits(interpreted: InterpretedStep, compiled: CompiledStep) -> None:
     fixed = Slice(interpreted, Q, speed=0.3)
     free = Slice(interpreted, Q, free=((1, 1),), speed=0.3)
-    assert free.method.m_free == 3
+    assert {piece.method.m_free for piece in free.pieces} == {3}
     found = certify(free, compiled, samples=1)
     assert found.agreement.differing == 0
     assert found.agreement.compared > 0
     assert found.attained.compiled == found.attained.proved
-    assert found.iterations >= enumerate_paths(fixed.method, fixed.given).iterations
+    assert found.iterations >= fixed.enumerate().iterations
     v, inputs = free.inputs(np.array([0.1, 0.2, -0.1, 1.0, 0.25]))
     assert interpreted.evaluate(Q, v, **inputs).qd_hi[1] == pytest.approx(0.25, abs=1e-9)
-
-
-def test_where_bounds_are_less_than_the_tolerance_the_compiled_tick_stops_as_soon_as_rows_hold_to_it() -> None:
-    mode, rng = "plane:0,1,0", np.random.default_rng(0)
-    # Joints 1e-13 rad from limits may move by 1e-10 rad/s, and rows hold to 1e-12 of a hand of up to 1 km/s.
-    q = np.where(rng.random(7) < 0.5, ROBOT.q_min + 1e-13, ROBOT.q_max - 1e-13)
-    q[[0, 2]] = 0.3
-    step = compile_step(ROBOT, CartesianError(), Mode.parse(mode))
-    found = certify(Slice(make_step(ROBOT, CartesianError(), mode), q, speed=1e3), step)
-    assert found.agreement.tolerated > 10
-    assert found.agreement.differing == 0
-    assert found.attained.compiled <= found.attained.proved == found.iterations
 
 
 @settings(deadline=None)
