@@ -18,8 +18,24 @@ if TYPE_CHECKING:
     from tests.formulations.reference import Array
 
 
-def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torque_limits: bool = False) -> Array:
-    """State a formulation in accelerations, as documented, from pinocchio's Jacobian and dynamics and exact bounds."""
+# Beyond rounding; cvxpy's solver is asked for 1e-10.
+CLOSE = 1e-8
+
+
+def by_cvxpy(
+    name: str,
+    q: Array,
+    qd_prev: Array,
+    v: Array,
+    mode: Mode,
+    *,
+    torque_limits: bool = False,
+    near: Array | None = None,
+) -> tuple[Array, float]:
+    """State a formulation in accelerations, as documented, from pinocchio's Jacobian and dynamics and exact bounds.
+
+    The command and its cost; of the commands `near` one, if that is given.
+    """
     robot = arm("lbr_med14")
     J_free, J_fixed = rows_at(robot, mode, q)
     low, high = bounds_at(robot, q)
@@ -69,20 +85,32 @@ def by_cvxpy(name: str, q: Array, qd_prev: Array, v: Array, mode: Mode, *, torqu
         tau, r = robot.mass_matrix(q) @ qdd + robot.bias_forces(q, qd_prev), cvxpy.Variable(nonneg=True)
         constraints.append(cvxpy.abs(tau) <= (1 + r) * (0.2 * robot.tau_max))
         objective += 0.1 * slope * (r + cvxpy.square(r) / 60.0)
+    if near is not None:
+        constraints.append(cvxpy.abs(qd - near) <= CLOSE)
     problem = cvxpy.Problem(cvxpy.Minimize(objective), constraints)
     tolerances = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
     problem.solve(solver=cvxpy.CLARABEL, **tolerances)  # type: ignore[no-untyped-call]  # cvxpy has no stubs for it
     assert problem.status == cvxpy.OPTIMAL
-    return np.asarray(qd.value)
+    return np.asarray(qd.value), float(problem.value)
+
+
+def check(got: Array, name: str, *state: Array, mode: Mode, torque_limits: bool = False) -> None:
+    """The command that cvxpy finds or, where the cost is too flat for its solver to tell, one that costs no more."""
+    wanted, least = by_cvxpy(name, *state, mode, torque_limits=torque_limits)
+    if not np.allclose(got, wanted, rtol=0, atol=1e-5):
+        _, cost = by_cvxpy(name, *state, mode, torque_limits=torque_limits, near=got)
+        assert cost <= least + CLOSE * max(1.0, abs(least)), (got, wanted)
 
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("mode", [*SOME_MODES, pytest.param("rcm:-0.12", marks=pytest.mark.long)])
 def test_cvxpy_agrees(name: str, mode: str) -> None:
     evaluate, hindered = evaluator("lbr_med14", name, mode), 0
-    for q, qd, v in admissible(arm("lbr_med14"), mode, 8, seed=5):
+    # Of these modes' states few are held back.
+    count = 24 if mode in ("fix-position", "line:z") else 8
+    for q, qd, v in admissible(arm("lbr_med14"), mode, count, seed=5):
         got = command(evaluate(q=q, v=v, qd_prev=qd))
-        np.testing.assert_allclose(got, by_cvxpy(name, q, qd, v, Mode.parse(mode)), atol=1e-5)
+        check(got, name, q, qd, v, mode=Mode.parse(mode))
         hindered += bool((np.abs(got - qd) > 0.99 * DT * arm("lbr_med14").qdd_max).any())
     assert hindered >= 3
 
@@ -95,7 +123,6 @@ def test_cvxpy_agrees_on_torque_limits(name: str) -> None:
     exceeded = 0
     for q, qd, v in admissible(robot, "fix-orientation", 6, seed=6):
         got = command(evaluate(q=q, v=v, qd_prev=qd, tau_max=0.2 * robot.tau_max))
-        wanted = by_cvxpy(name, q, qd, v, Mode.fix_orientation(), torque_limits=True)
-        np.testing.assert_allclose(got, wanted, atol=1e-5)
+        check(got, name, q, qd, v, mode=Mode.fix_orientation(), torque_limits=True)
         exceeded += bool((np.abs(robot.bias_forces(q, qd)) > 0.2 * robot.tau_max).any())
     assert 0 < exceeded < 6
