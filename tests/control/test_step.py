@@ -23,8 +23,8 @@ SPEEDS = (1e-6, 0.01, 0.2, 2.0)
 LEAST_SOLVED = {"thesis-active-set": 0.25, "clarabel": 0.8, "piqp": 0.75, "casadi-qrqp": 0.75, "active-set": 0.99}
 # Where the task is an equality too, rows are dependent at every singularity, not at those of the locked rows alone.
 # The upper level of a hierarchy is flat besides.
-# Split into two directions, a joint at rest is on both of their bounds at once: our own solver runs into its cap at 10
-# of 8,400 states of davinci5, and five locked rows of its five joints near zero leave no digits at 106.
+# Split into two directions, a joint at rest is on both of their bounds at once. Five locked rows of davinci5's five
+# joints near zero leave no digits at 106 of 8,400 states.
 # With a limit of jerk every joint has four rows of its own, with two slacks that enter many of them.
 LEAST_SOLVED_BY_FORMULATION = {
     ("cartesian-error-robust", "casadi-qrqp"): 0.5,

@@ -160,3 +160,22 @@ def test_core_proves_infeasibility(cores: dict[str, Core], name: str) -> None:
             assert hi @ np.maximum(z, 0) + lo @ np.minimum(z, 0) < -1e-9
             proven += 1
     assert 50 < proven < 280
+
+
+@pytest.mark.parametrize("kind", ["run-time", "fixed"])
+def test_rows_that_contradict_each_other_by_rounding_do_not_send_it_round_in_circles(
+    cores: dict[str, Core], kind: str
+) -> None:
+    """Rows 0 and 1 are one but for 2.8e-12 along row 2's normal, and cross by 2e-12, just above the tolerance.
+
+    Row 1 drops row 2, is then found satisfied as far as rounding can tell, and has to look again when row 2 is back.
+    """
+    M = np.zeros((7, 3))
+    M[0, 0], M[1, :2], M[2, 1], M[3:, 2] = 1.0, (-1.0, 2.8e-12), 1.0, 1.0
+    lo, hi = np.full(7, -np.inf), np.full(7, np.inf)
+    hi[:3] = -1.0, 1.0 - 4.8e-12, -1.0
+    status, w, z, iterations = cores[kind](M, lo, hi)
+    assert status is Status.SOLVED
+    np.testing.assert_allclose(w, [-1.0, -1.0, 0.0], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(z[[0, 2]], [1.0, 1.0], rtol=0, atol=1e-9)
+    assert iterations < 40
