@@ -86,6 +86,7 @@ def test_drilling_keeps_what_is_required(seconds: str, seed: str) -> None:
         assert float(found[1]) > least
 
 
+@pytest.mark.long
 def test_drilling_says_what_is_broken(drilling: ModuleType) -> None:
     """The table of a run that was tampered with shows what was done to it."""
     drilled = drilling.drill(drilling.make_controller("joint-space-robust"), 0.5)
