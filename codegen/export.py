@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..formulations import ABOVE, Evaluator, Mode, get_formulation, levels_of, lower
+from ..formulations import ABOVE, DEFAULT_DT, Evaluator, Mode, get_formulation, levels_of, lower
 from ..solvers import get_solver
 from ..solvers.native import CompilerError, compiler
 from .emit import number
@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 TICKS_PER_MODE: Final = 200
 TOLERANCE: Final = 1e-9
 _FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize")
-# Control period [s]: the default of `dt`.
-_PERIOD: Final = 1e-3
 # The hand moves this much per tick [m/s, rad/s]; fast, so that a short record meets limits.
 _HAND_SPEED: Final = 0.4
 
@@ -176,8 +174,8 @@ def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Rec
                 q = q + 1e-3 * rng.normal(size=robot.nv)
                 continue
             columns.append((index, start, q, v, command))
-            start, qd, qdd = False, command, (command - qd) / _PERIOD
-            q = q + _PERIOD * qd
+            start, qd, qdd = False, command, (command - qd) / DEFAULT_DT
+            q = q + DEFAULT_DT * qd
     if not columns:
         raise ExportError(f"{formulation.name} on {robot.name}: expected ticks that can be solved, got none")
     widest = max(mode.m_free for mode in modes)

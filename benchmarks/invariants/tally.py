@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from pydantic import BaseModel, Field, field_serializer
 
+from ..json_numbers import with_words
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -70,7 +72,7 @@ class Violation(BaseModel):
     @field_serializer("state", when_used="json")
     def _words_for_infinity(self, state: dict[str, list[float]]) -> dict[str, list[float | str]]:
         """JSON knows no infinity; as words they are read back as they were."""
-        return {name: [x if np.isfinite(x) else str(x) for x in values] for name, values in state.items()}
+        return {name: with_words(values) for name, values in state.items()}
 
 
 class Row(BaseModel):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass
-from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from ...codegen import compile_step
 from ...robots import load_robot
+from ..json_numbers import with_words
 from ..store import write_whole
 from .states import Batch, Draws
 from .timing import Stopwatch
@@ -91,8 +91,8 @@ class Found:
 
     def written(self) -> dict[str, Any]:
         """Describe it for JSON, which knows no infinity: as words they are read back as they were."""
-        rows = {name: _words(getattr(self, name)) for name in ("q", "v", "qd_prev", "qdd_prev")}
-        return {**asdict(self), **rows, "limits": {name: _words(values) for name, values in self.limits.items()}}
+        rows = {name: with_words(getattr(self, name)) for name in ("q", "v", "qd_prev", "qdd_prev")}
+        return {**asdict(self), **rows, "limits": {name: with_words(values) for name, values in self.limits.items()}}
 
 
 @dataclass(frozen=True)
@@ -182,10 +182,6 @@ def replay(case: WorstCase) -> Replayed:
     return Replayed(
         Found.of(step, states[0], seconds[0]), Found.of(step, states[1], seconds[1]), float(np.median(seconds[2:]))
     )
-
-
-def _words(values: list[float]) -> list[float | str]:
-    return [x if isfinite(x) else str(x) for x in values]
 
 
 def _numbers(values: list[float | str]) -> list[float]:

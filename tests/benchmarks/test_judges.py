@@ -178,7 +178,7 @@ def test_a_declaration_that_is_another_one_in_cvxpy_is_named(spoilt_by: float) -
         for parameter in made.parameters.values():
             parameter.value = parameter.value * (1.0 + spoilt_by)
 
-    made.set = another  # type: ignore[assignment]  # that is the point
+    made.set = another  # type: ignore[assignment]  # a method is replaced, to spoil what it is given
     found = row()
     judge_declared(found, made, step, states().first(8), {}, answers)
     assert ("cvxpy answer" in found.violations) == bool(spoilt_by)

@@ -108,6 +108,7 @@ def test_the_check_needs_last_command_and_acceleration(formulation: str, forgott
     assert files["main.c"].count(forgotten) == 1
     files["main.c"] = files["main.c"].replace(forgotten, "(void)0;")
     write(tmp_path, files)
+    # What is forgotten leaves a variable unused, which is an error otherwise, and not what is to be found here.
     done = check(tmp_path, "-Wno-unused-but-set-variable", "-Wno-unused-variable")
     assert done.returncode == 1
     assert "FAILED" in done.stdout
