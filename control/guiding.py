@@ -198,7 +198,7 @@ class GuidingController:
         Raises
         ------
         InputError
-            Naming the one that has the wrong shape or no numbers. One that is not finite is a lost sample, not an error.
+            Naming the one that has the wrong shape or no numbers. A sample that is not finite is lost, and no error.
         """
         measured = checked_array("q", q, self.robot.nv, finite=False)
         pull = checked_array("wrench", wrench, 6, finite=False)
@@ -276,7 +276,7 @@ class GuidingController:
 
     def _brake(self, q: Array, status: Status) -> GuidingResult:
         """The safe stop; the hand goes on from what it leaves of the motion."""
-        self._remember(self._unit.brake(q, self._qd, self._limit))
+        self._brake_from_last(q)
         left = self._unit.guided_velocity(q, self._qd)
         self._v = left if np.isfinite(left).all() else np.zeros_like(left)
         nothing = np.zeros_like(left)
@@ -299,7 +299,7 @@ class GuidingController:
         assert self._anchor is not None, "anchored at the first tick"  # noqa: S101  # for mypy
         asked = self._unit.ask(q, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=True)
         self._limit = asked.qd_limit
-        self._remember(self._unit.brake(q, self._qd, self._limit))
+        self._brake_from_last(q)
         done = self._unit
         if not self._qd.any():
             if self._stop_asked:
@@ -325,6 +325,11 @@ class GuidingController:
             yielded=False,
             held=self._held,
         )
+
+    def _brake_from_last(self, q: Array) -> None:
+        self._qd = self._unit.brake(q, self._qd, self._limit)
+        # The acceleration of a stop is not one to go on with: the arm would be carried past its rest.
+        self._qdd = np.zeros_like(self._qd)
 
     def _remember(self, qd: Array) -> None:
         self._qdd = (qd - self._qd) / self.dt
