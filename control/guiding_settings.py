@@ -46,7 +46,7 @@ class GuidingSettings:
     max_failures : int
         So many ticks in a row whose QP is not solved, or that have no usable sample, end in a stop.
     hold_ticks : int
-        So many ticks in a row a sample (`q`, wrench) that is not finite is replaced: by the last wrench, and by where the
+        So many ticks in a row a sample (`q`, wrench) that is not finite is replaced by the last wrench and by where the
         last command has taken the arm. After that the arm brakes until there is one.
 
     Raises
