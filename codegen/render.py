@@ -89,6 +89,7 @@ def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
         "solver_source": _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources),
         "sizes": [{"n": n, "m": m} for n, m in code.sizes],
         "largest": max(n for n, _ in code.sizes),
+        "most_equalities": max(1, *(mode.m_eq for mode in code.single)),
         "kernels": _kernels(code),
         "joint_stride": padded(code.nv),
         "row_stride": padded(code.rows),

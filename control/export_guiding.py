@@ -139,14 +139,14 @@ def _header(table: dict[str, NDArray[np.float64] | NDArray[np.int64]], prefix: s
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
-        f"enum {{ TICKS = {len(table['mode'])} }};",
+        f"enum {{ recorded_ticks = {len(table['mode'])} }};",
     ]
     for name in ("mode", "stop"):
         values = ", ".join(str(int(value)) for value in table[name])
-        lines += ["", f"static const int recorded_{name}[TICKS] = {{{values}}};"]
+        lines += ["", f"static const int recorded_{name}[recorded_ticks] = {{{values}}};"]
     for name, unit in (("q", "rad or m"), ("wrench", "N, N m"), ("qd", "rad/s or m/s")):
         rows = table[name]
-        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[TICKS][{rows.shape[1]}] = {{"]
+        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[recorded_ticks][{rows.shape[1]}] = {{"]
         lines += [f"    {{{', '.join(number(float(x)) for x in row)}}}," for row in rows]
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])

@@ -154,7 +154,7 @@ def test_what_is_exported_builds_without_warnings_and_agrees(tmp_path, robot, fo
     line_of_wrench = next(text for text in recorded.splitlines() if "recorded_wrench" in text)
     (folder / "guiding_recorded.h").write_text(
         recorded.replace(line_of_wrench, line_of_wrench + "\n    {9.0, 9.0, 9.0, 9.0, 9.0, 9.0},").replace(
-            "recorded_wrench[TICKS]", "recorded_wrench[TICKS + 1]"
+            "recorded_wrench[recorded_ticks]", "recorded_wrench[recorded_ticks + 1]"
         ),
         encoding="utf-8",
     )
