@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 TICKS_PER_MODE: Final = 300
-# Where a command builds on the last one it carries on what that one was off by.
-TOLERANCE_WITH_MEMORY: Final = 1e-8
 # The session's stop begins here, in the first mode, and ends so much later [ticks].
 _STOP: Final = (150, 60)
 # What the hand pulls with, along each axis, at most [N, N m].
@@ -81,9 +79,13 @@ def export_guiding(
     code = step_code(robot, made, parsed, prefix)
     files = render_guiding(code, robot, parsed, chosen)
     table = record(robot, made, parsed, chosen)
-    remembers = any(field.name == "qd_prev" for field in code.inputs)
-    tolerance = number(TOLERANCE_WITH_MEMORY if remembers else TOLERANCE)
-    shared = {"p": prefix, "nv": robot.nv, "tolerance": tolerance, "ticks": len(table["mode"])}
+    shared = {
+        "p": prefix,
+        "nv": robot.nv,
+        "tolerance": number(TOLERANCE),
+        "ticks": len(table["mode"]),
+        "change": any(field.name == "qdd_prev" for field in code.parameters),
+    }
     templates = environment()
     files["guiding_main.c"] = templates.get_template("guiding_main.c.j2").render(shared)
     files["guiding_recorded.h"] = _header(table, prefix)

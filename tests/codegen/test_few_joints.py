@@ -56,7 +56,7 @@ def test_a_scara_arm_moves_along_its_spindle(formulation: str) -> None:
 @pytest.mark.parametrize(
     ("axes", "mode"),
     [
-        (1, "line:z"),
+        pytest.param(1, "line:z", marks=pytest.mark.long),
         (4, "plane:1,-2,0.5"),
         pytest.param(2, "fix-position", marks=pytest.mark.long),
         pytest.param(3, "line:z", marks=pytest.mark.long),
@@ -69,7 +69,7 @@ def test_a_scara_arm_moves_along_its_spindle(formulation: str) -> None:
 def test_compiled_and_interpreted_steps_agree(formulation: str, axes: int, mode: str) -> None:
     robot, rng = chain(axes), np.random.default_rng(axes)
     compiled, interpreted = steps(robot, formulation, mode)
-    for _ in range(40):
+    for _ in range(20):
         q = robot.random_configuration(rng)
         v = rng.normal(size=compiled.mode.m_free) * rng.choice(SPEEDS)
         result, wanted = compiled(q, v), interpreted(q, v)
@@ -81,7 +81,7 @@ def test_an_arm_with_a_remote_centre_and_a_mode_that_locks_five_rows() -> None:
     """Five joints, seven equalities: the trocar's two rows beside the mode's five."""
     robot, rng = arm("davinci5"), np.random.default_rng(0)
     compiled, interpreted = steps(robot, "joint-space + remote-centre", "line:z")
-    for _ in range(40):
+    for _ in range(20):
         q = robot.random_configuration(rng)
         v = rng.normal(size=1) * rng.choice(SPEEDS)
         pose = robot.pose(q)

@@ -18,11 +18,12 @@ from kinqp.control import export_guiding
 from kinqp.formulations import available_formulations
 from kinqp.solvers.active_set import embedded_source, fixed_size_sources
 from tests.programs import need
-from tests.robots.arms import arm
+from tests.robots.chains import chain
 
-MODES = ("fix-orientation", "free")
-# One of each kind of generated tick: no equalities and H diagonal; equalities; neither; several QPs in order.
-KINDS = ("cartesian-error", "joint-space", "cartesian-error-robust", "hierarchical")
+MODES = ("line:z", "free")
+# One of each kind of generated tick: H diagonal and no equalities; with equalities or without, of rows that bound one
+# variable each or of any others; several QPs in order.
+KINDS = ("cartesian-error", "joint-space", "joint-space-acceleration", "hierarchical")
 PREFIX = "arm"
 # What a program that uses an export may define: single letters, and words that sizes are called by.
 WORDS = ("NV", "NQ", "NDOF", "DOF", "EQ", "FREE", "FIXED", "LOCKED", "SIZE", "WIDTH", "STRIDE", "RANK", "ROWS", "TICKS")
@@ -40,7 +41,7 @@ def exported(formulation: str) -> dict[str, str]:
         mock.patch("kinqp.control.export_guiding.TICKS_PER_MODE", 2),
         mock.patch.object(export, "_measured", return_value=dict.fromkeys(("code", "stack", "compiler"), "")),
     ):
-        export_guiding(arm("lbr_med14"), formulation, MODES, folder, name=PREFIX)
+        export_guiding(chain(3), formulation, MODES, folder, name=PREFIX)
         return {path.name: path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
 
 

@@ -3,6 +3,7 @@
 KINQP_INLINE int kinqp_factor(int n, int stride, const double *matrix, double *factor, double *reciprocal) {
     double scaled[KINQP_LARGEST * KINQP_LARGEST];
     int positive = 1;
+    KINQP_ASSERT(n <= KINQP_LARGEST && n <= stride);
     for (int j = 0; j < n; ++j) {
         for (int i = j; i < n; ++i) {
             double value = matrix[i * stride + j];

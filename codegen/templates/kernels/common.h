@@ -3,6 +3,7 @@ KINQP_INLINE int kinqp_padded(int n) { return (n + 3) / 4 * 4; }
 
 /* out := a + share * b, over a multiple of four entries. */
 KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const double *b, double *out) {
+    KINQP_ASSERT(n % 4 == 0);
     for (int i = 0; i < n; i += 4) {
         kinqp_lanes x;
         kinqp_load(a + i, &x);
@@ -15,6 +16,7 @@ KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const d
  * product of the shares of its diagonal entries that are left as pivots: 1 for orthogonal rows, 0 for dependent ones. */
 KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double *inverse) {
     double factor[36], scaled[36], reciprocal[6], independence = 1.0;
+    KINQP_ASSERT(m <= 6); /* rows of a twist */
     for (int j = 0; j < m; ++j) {
         for (int i = j; i < m; ++i) {
             double value = matrix[i * m + j];

@@ -3,6 +3,7 @@ static void kinqp_locked_rows_dependent(int k, int m, int n, const double *guide
                                         double *J_bar, double *qd) {
     const int stride = kinqp_padded(n);
     double basis[6 * KINQP_MOST], share[6], shares_of[36];
+    KINQP_ASSERT(m <= 6 && stride <= KINQP_MOST);
     for (int i = 0; i < stride; ++i) qd[i] = 0.0;
     for (int i = 0; i < m; ++i) {
         double *rest = basis + i * stride, asked = v[i];
@@ -43,6 +44,7 @@ KINQP_INLINE void kinqp_locked_rows(int k, int m, int n, const double *guided, c
     const int stride = kinqp_padded(n);
     double gram[36], cross[36], inverse[36], scale;
     int drift = 0;
+    KINQP_ASSERT(k + m <= 6); /* a mode's twist has six rows */
     for (int j = 0; j < m; ++j) drift |= v_fixed[j] < 0.0 || v_fixed[j] > 0.0;
     for (int l = 0; l < stride; ++l) qd[l] = 0.0;
     for (int i = 0; i < m; ++i)

@@ -9,6 +9,7 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *rows, const double *b, doub
     double length2[KINQP_EQUALITIES], rest2[KINQP_EQUALITIES], triangle[KINQP_EQUALITIES * KINQP_LARGEST], head[KINQP_LARGEST];
     const int most = m < n ? m : n;
     int rank = 0;
+    KINQP_ASSERT(m <= KINQP_EQUALITIES && n <= KINQP_LARGEST);
     for (int i = 0; i < m; ++i) {
         length2[i] = rest2[i] = kinqp_dot_padded(stride, rows + i * stride, rows + i * stride);
         order[i] = i;
@@ -28,7 +29,7 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *rows, const double *b, doub
         const int chosen = order[best];
         order[best] = order[rank];
         order[rank] = chosen;
-        /* The reflection that takes the rest of this row to a multiple of the axis `rank`; its vector stays in the row. */
+        /* The reflection that takes the rest of this row to a multiple of the axis `rank` < n; its vector stays in the row. */
         double *row = rows + chosen * stride;
         const double norm = sqrt(rest);
         head[rank] = row[rank] > 0.0 ? -norm : norm;
@@ -61,6 +62,7 @@ KINQP_INLINE void kinqp_null_basis(int n, int rank, int width, const double *row
                                     const int *order, double *basis, double *x) {
     const int stride = kinqp_padded(n);
     int moved = 0;
+    KINQP_ASSERT(rank <= n && width % 4 == 0 && n - rank <= width);
     for (int i = 0; i < n; ++i) {
         for (int j = 0; j < width; ++j) basis[i * width + j] = i == j + rank ? 1.0 : 0.0;
         x[i] = i < rank ? along[i] : 0.0;

@@ -6,6 +6,7 @@ KINQP_INLINE void kinqp_robust_inverse(int m, int n, const double *rows, double 
     const int stride = kinqp_padded(n);
     const double least = threshold * threshold;
     double gram[36], gram_inverse[36], scale, trace = 0.0, frobenius2 = 0.0;
+    KINQP_ASSERT(m <= 6); /* rows of a twist */
     for (int i = 0; i < m; ++i) {
         for (int j = 0; j <= i; ++j)
             gram[i * m + j] = gram[j * m + i] = kinqp_dot_padded(stride, rows + i * stride, rows + j * stride);
