@@ -10,7 +10,7 @@ import casadi as ca
 from ..formulations import ABOVE, DATA, DeclarationError, lower
 from ..solvers.active_set import library
 from .emit import emit
-from .fields import C_NAMES, SIGNALS, ModeText, field_of, row_statements, sources_of
+from .fields import SIGNALS, ModeText, c_name, field_of, row_statements, sources_of
 
 if TYPE_CHECKING:
     from ..formulations import Hierarchy, Input, Lowered, Mode
@@ -119,7 +119,7 @@ def _level_code(lowered: Lowered) -> LevelCode:
     # Asking for these may add inputs, as they do where the interpreted step judges by them.
     judged = {name: getattr(tick, name) for name in _JUDGED} | {"v_fixed": tick.v_fixed}
     data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
-    outputs = {C_NAMES.get(name, name): ca.SX(value).T for name, value in (data | judged).items() if value.numel()}
+    outputs = {c_name(name): ca.SX(value).T for name, value in (data | judged).items() if value.numel()}
     values = ca.cse([ca.densify(value) for value in outputs.values()])
     function = ca.Function("level", [given.symbol for given in tick.inputs], values)
     sources = sources_of({given.name: field_of(given) for given in tick.inputs}) | {ABOVE: "above"}

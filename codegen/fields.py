@@ -121,6 +121,11 @@ class ModeText(ABC):
         """Whether a capped tick has an admissible point to fall back on."""
 
 
+def c_name(name: str) -> str:
+    """Name of an array in generated code: see `C_NAMES`."""
+    return C_NAMES.get(name, name)
+
+
 def identifier(text: str) -> str:
     """Turn a name into a C identifier: letters, digits and underscores of ASCII, in lower case."""
     return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()

@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from ..solvers.active_set import embedded_source, fixed_size_sources
-from .fields import MEMORY
+from .fields import C_NAMES, MEMORY
 from .kernels import padded
 
 if TYPE_CHECKING:
     from .model import StepCode
 
 _INCLUDE = re.compile(r'^#include "([^"]+)"\n', flags=re.MULTILINE)
+# Matrices of the solver's problem, which its struct calls by the letters of formulas, where they are declared or read.
+_MATRICES = re.compile(rf"(?<=->)[{''.join(C_NAMES)}]\b|(?<= \*)[{''.join(C_NAMES)}](?=;)")
 
 
 def library_version() -> str:
@@ -73,7 +75,7 @@ def render_step(code: StepCode) -> dict[str, str]:
         "checked": [mode for mode in code.single if mode.m_fixed and not mode.m_eq and not mode.locked],
         "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
     }
-    values |= _of_one_qp(code, sources) if code.single else {"solver_source": embedded_source("KINQP_INLINE")}
+    values |= _of_one_qp(code, sources) if code.single else {"solver_source": general_solver()}
     source = "step.c.j2" if code.single else "cascade.c.j2"
     templates = environment()
     return {
@@ -102,6 +104,11 @@ def render_batch(code: StepCode) -> str:
     memory = [field for field in code.parameters if field.name in MEMORY]
     values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
     return environment().get_template("batch.c.j2").render(values | {"signals": signals, "memory": memory})
+
+
+def general_solver() -> str:
+    """Source of the solver for sizes known at run time, in names that no user's macro replaces; see `C_NAMES`."""
+    return _MATRICES.sub(lambda match: C_NAMES[match[0]], embedded_source("KINQP_INLINE"))
 
 
 def math_header() -> str:

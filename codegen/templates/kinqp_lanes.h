@@ -5,7 +5,8 @@
 #include <math.h>
 
 /* What the bounds of arrays rest on; looked at only where KINQP_DEBUG is defined. */
-#ifdef KINQP_DEBUG
+#if defined(KINQP_ASSERT)
+#elif defined(KINQP_DEBUG)
 #include <stdio.h>
 #include <stdlib.h>
 #define KINQP_ASSERT(holds) \

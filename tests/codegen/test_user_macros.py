@@ -13,10 +13,10 @@ from unittest import mock
 import pytest
 
 from kinqp.codegen import export
-from kinqp.codegen.render import _INCLUDE, _flatten, _keep_instantiated
+from kinqp.codegen.render import _INCLUDE, _flatten, _keep_instantiated, general_solver
 from kinqp.control import export_guiding
 from kinqp.formulations import available_formulations
-from kinqp.solvers.active_set import embedded_source, fixed_size_sources
+from kinqp.solvers.active_set import fixed_size_sources
 from tests.programs import need
 from tests.robots.chains import chain
 
@@ -51,7 +51,7 @@ def solver_text() -> str:
     sources = fixed_size_sources()
     header = _INCLUDE.sub("", sources["kinqp_as.h"])
     fixed = _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources)
-    return "\n".join((embedded_source("KINQP_INLINE"), header, fixed))
+    return "\n".join((general_solver(), header, fixed))
 
 
 def capitals(text: str) -> set[str]:
