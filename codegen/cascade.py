@@ -10,7 +10,7 @@ import casadi as ca
 from ..formulations import ABOVE, DATA, DeclarationError, lower
 from ..solvers.active_set import library
 from .emit import emit
-from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
+from .fields import SIGNALS, ModeText, c_name, field_of, row_statements, sources_of
 
 if TYPE_CHECKING:
     from ..formulations import Hierarchy, Input, Lowered, Mode
@@ -80,8 +80,8 @@ class CascadeCode(ModeText):
         return sum(level.max_iterations for level in self.levels)
 
 
-def cascade_code(formulation: Hierarchy, robot: Robot, mode: Mode) -> CascadeCode:
-    """Work out the code of a hierarchy in one mode.
+def cascade_code(formulation: Hierarchy, robot: Robot, mode: Mode, symbol: str) -> CascadeCode:
+    """Work out the code of a hierarchy in one mode, whose C symbols are called by `symbol`.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def cascade_code(formulation: Hierarchy, robot: Robot, mode: Mode) -> CascadeCod
     tick = lowered[0].tick
     return CascadeCode(
         text=str(mode),
-        symbol=mode_symbol(mode),
+        symbol=symbol,
         free_names=", ".join(mode.free_names),
         m_free=mode.m_free,
         m_fixed=mode.m_fixed,
@@ -119,7 +119,7 @@ def _level_code(lowered: Lowered) -> LevelCode:
     # Asking for these may add inputs, as they do where the interpreted step judges by them.
     judged = {name: getattr(tick, name) for name in _JUDGED} | {"v_fixed": tick.v_fixed}
     data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
-    outputs = {name: ca.SX(value).T for name, value in (data | judged).items() if value.numel()}
+    outputs = {c_name(name): ca.SX(value).T for name, value in (data | judged).items() if value.numel()}
     values = ca.cse([ca.densify(value) for value in outputs.values()])
     function = ca.Function("level", [given.symbol for given in tick.inputs], values)
     sources = sources_of({given.name: field_of(given) for given in tick.inputs}) | {ABOVE: "above"}

@@ -207,17 +207,17 @@ def recorded_header(recorded: Recorded, code: StepCode, *, remembers: bool) -> s
         f"#ifndef {code.prefix.upper()}_RECORDED_H",
         f"#define {code.prefix.upper()}_RECORDED_H",
         "",
-        f"enum {{ TICKS = {len(recorded.mode)} }};",
+        f"enum {{ recorded_ticks = {len(recorded.mode)} }};",
         "",
-        f"static const int recorded_mode[TICKS] = {{{', '.join(map(str, recorded.mode))}}};",
+        f"static const int recorded_mode[recorded_ticks] = {{{', '.join(map(str, recorded.mode))}}};",
     ]
     if remembers:
         lines += ["", "/* 1: the arm is at rest, and what was sent before is of no account */"]
-        lines += [f"static const int recorded_start[TICKS] = {{{', '.join(map(str, recorded.start))}}};"]
+        lines += [f"static const int recorded_start[recorded_ticks] = {{{', '.join(map(str, recorded.start))}}};"]
     units = {"q": "rad or m", "v": "m/s, rad/s", "qd": "rad/s or m/s"}
     for name, unit in units.items():
         table: Array = getattr(recorded, name)
-        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[TICKS][{table.shape[1]}] = {{"]
+        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[recorded_ticks][{table.shape[1]}] = {{"]
         lines += [f"    {{{', '.join(number(float(x)) for x in row)}}}," for row in table]
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
@@ -13,14 +14,19 @@ from .emit import emit, number
 from .kernels import pack, places
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from ..formulations import Input, Mode, Tick
 
+# Arrays of generated code by the letter that formulas give them. Every name that generated code defines is in lower
+# case, or begins with KINQP_ or with the export's own prefix: a user's macro, such as -DN=3, never replaces one.
+C_NAMES: Final = {"H": "hessian", "A": "equalities", "C": "constraints", "J": "jacobian", "K": "command"}
 # New at every tick; all other run-time inputs are parameters.
 SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 # Parameters, with a default, that are new at every tick all the same: a batch takes a row of them for each.
 MEMORY: Final = ("qdd_prev",)
+# One for each joint, or for each of several things: arrays even where there is one, since code runs over them.
+_ARRAYS: Final = (*SIGNALS, "qdd_prev", "q_min", "q_max", "qd_max", "qdd_max", "tau_max", "task_weight", "joint_weight")
 _COMMENTS: Final = {
     "q": "joint positions",
     "v": "velocity that the hand asks for, along the mode's axes",
@@ -123,16 +129,21 @@ class ModeText(ABC):
         """Whether a capped tick has an admissible point to fall back on."""
 
 
+def c_name(name: str) -> str:
+    """Name of an array in generated code: see `C_NAMES`."""
+    return C_NAMES.get(name, name)
+
+
 def identifier(text: str) -> str:
-    """Turn a name into a C identifier."""
-    return re.sub(r"\W+", "_", text.replace("-", "_")).strip("_").lower()
+    """Turn a name into a C identifier: letters, digits and underscores of ASCII, in lower case."""
+    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
 
 
 def field_of(given: Input) -> Field:
     """Return the struct field that a run-time input is read from."""
     default = given.default if given.default is not None else [0.0] * given.size
     comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')} [{given.unit}]"
-    array = given.size > 1 or given.name in SIGNALS or given.name in ("task_weight", "joint_weight")
+    array = given.size > 1 or given.name in _ARRAYS
     least, most = map(number, given.range)
     defaults = tuple(number(float(x)) for x in default)
     return Field(given.name, comment, given.size, array, defaults, least, most, given.describe_range())
@@ -147,9 +158,31 @@ def sources_of(fields: Mapping[str, Field]) -> dict[str, str]:
     }
 
 
-def mode_symbol(mode: Mode) -> str:
-    """Return what a mode's C symbols are called by."""
-    return identifier(str(mode).replace("-", "m") if "-" in mode.argument else str(mode))
+def mode_symbols(modes: Sequence[Mode]) -> tuple[str, ...]:
+    """Return what the C symbols of each mode of a library are called by, each another name.
+
+    Where plain names are the same, as those of `plane:0.1,0,5` and `plane:0,1,0.5` are, these modes write their decimal
+    points as "p": `plane_0p1_0_5`, `plane_0_1_0p5`. The names do not depend on the order of the modes.
+    """
+    symbols = [identifier(str(mode).replace("-", "m") if "-" in mode.argument else str(mode)) for mode in modes]
+    for spelling in (_spelled, _numbered):
+        taken = Counter(symbols)
+        symbols = [
+            symbol if taken[symbol] == 1 and symbol else spelling(mode)
+            for mode, symbol in zip(modes, symbols, strict=True)
+        ]
+    return tuple(symbols)
+
+
+def _spelled(mode: Mode) -> str:
+    """Write a mode so that any other one that `Mode.parse` reads is written in another way."""
+    argument = mode.argument.replace(".", "p").replace("-", "m").replace("+", "")
+    return identifier(str(mode).replace(f":{mode.argument}", f":{argument}"))
+
+
+def _numbered(mode: Mode) -> str:
+    """Write a mode of one's own, whose name need not have a letter that C knows, by the bytes of its name."""
+    return f"mode_{str(mode).encode().hex()}"
 
 
 def row_statements(tick: Tick) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from ..formulations import Hierarchy, Tick, levels_of, lower
 from .cascade import cascade_code
 from .definite import require_definite
 from .emit import emit, needed_for
-from .fields import SIGNALS, ModeText, field_of, mode_symbol, row_statements, sources_of
+from .fields import C_NAMES, SIGNALS, ModeText, field_of, mode_symbols, row_statements, sources_of
 from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 from .shape import Shape, identical
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from .kernels import Layout
 
 # Rows of these are padded, for loops over four columns at a time.
-_PADDED: Final = ("A", "J", "F")
-# What the caller has room for.
-_OF_CALLER: Final = ("J", "F")
+# What the caller has room for: guided and locked rows of the Jacobian.
+_OF_CALLER: Final = (C_NAMES["J"], "locked")
+_PADDED: Final = (C_NAMES["A"], *_OF_CALLER)
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
-_LATE: Final = ("C", "start")
+_LATE: Final = (C_NAMES["C"], "start")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +67,11 @@ class ModeCode(ModeText):
     def n_null(self) -> int:
         """Variables left where the equalities have full rank, at least one: C has no arrays of size zero."""
         return max(1, self.n - self.m_eq)
+
+    @property
+    def may_be_full_rank(self) -> bool:
+        """Whether the equalities can have full rank, and then leave a smaller problem: code of its own solves that."""
+        return 0 < self.m_eq <= self.n and self.n_null < self.n
 
     @property
     def row_stride(self) -> int:
@@ -138,18 +143,19 @@ class StepCode:
         """Distinct (variables, rows) of the solver, in order."""
         sizes = [(mode.n, mode.m) for mode in self.single]
         # With equalities of full rank the problem is that much smaller; without, it is padded to its full size.
-        sizes += [(mode.n_null, mode.m) for mode in self.single if mode.m_eq]
+        sizes += [(mode.n_null, mode.m) for mode in self.single if mode.may_be_full_rank]
         return tuple(dict.fromkeys(sizes))
 
 
 def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], prefix: str) -> StepCode:
     """Work out the code of a formulation on a robot in one or more modes."""
     codes: tuple[ModeText, ...]
+    named = tuple(zip(modes, mode_symbols(modes), strict=True))
     if isinstance(formulation, Hierarchy):
-        codes = cascades = tuple(cascade_code(formulation, robot, mode) for mode in modes)
+        codes = cascades = tuple(cascade_code(formulation, robot, *each) for each in named)
         max_iterations = max(code.max_iterations for code in cascades)
     else:
-        codes = single = tuple(_mode_code(formulation, robot, mode) for mode in modes)
+        codes = single = tuple(_mode_code(formulation, robot, *each) for each in named)
         max_iterations = max(10 * (code.m + code.n) + 50 for code in single)
     last = levels_of(formulation)[-1]
     largest: dict[str, Input] = {}
@@ -177,7 +183,7 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
     )
 
 
-def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
+def _mode_code(formulation: Formulation, robot: Robot, mode: Mode, symbol: str) -> ModeCode:
     lowered, reduced = _lower_for_c(formulation, robot, mode)
     inputs, tick = lowered.inputs, lowered.tick
     fields = {given.name: field_of(given) for given in inputs}
@@ -208,7 +214,7 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode) -> ModeCode:
     first, second, third = (pack(part, padded_arrays) for part in (first, second, third))
     return ModeCode(
         text=str(mode),
-        symbol=mode_symbol(mode),
+        symbol=symbol,
         free_names=", ".join(mode.free_names),
         n=reduced.n,
         m=reduced.m,
@@ -252,21 +258,21 @@ def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lo
 
 def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.SX]:
     """Arrays of the generated step that formulas fill in, each as C reads it: row by row."""
-    outputs = {"H": ca.diag(reduced.H) if shape.diagonal else reduced.H}
+    outputs = {C_NAMES["H"]: ca.diag(reduced.H) if shape.diagonal else reduced.H}
     if shape.gradient:
         outputs["g"] = reduced.g
     if reduced.m_eq:
-        outputs |= {"A": reduced.A, "b": reduced.b}
+        outputs |= {C_NAMES["A"]: reduced.A, "b": reduced.b}
     # Bounds and offset as rows, where they are padded.
-    outputs |= {"lower": reduced.lower.T, "upper": reduced.upper.T, "J": lowered.tick.J_free}
+    outputs |= {"lower": reduced.lower.T, "upper": reduced.upper.T, C_NAMES["J"]: lowered.tick.J_free}
     if lowered.tick.m_fixed:
-        outputs["F"] = lowered.tick.J_fixed
+        outputs["locked"] = lowered.tick.J_fixed
     if not shape.direct_rows:
-        outputs["C"] = reduced.C
+        outputs[C_NAMES["C"]] = reduced.C
     if not shape.direct_command:
         outputs["k"] = reduced.k.T
         if not shape.same:
-            outputs["K"] = reduced.K
+            outputs[C_NAMES["K"]] = reduced.K
     if shape.start:
         outputs["start"] = reduced.start
     return outputs
@@ -275,7 +281,7 @@ def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.S
 def _layout_of(name: str, shape: Shape) -> Layout:
     if name in _PADDED or (shape.diagonal and name in _PADDED_IF_DIAGONAL):
         return "rows"
-    return "columns" if shape.diagonal and name == "C" else "plain"
+    return "columns" if shape.diagonal and name == C_NAMES["C"] else "plain"
 
 
 def _aliases(outputs: dict[str, ca.SX], layouts: dict[str, Layout], cuts: Sequence[Cut]) -> dict[str, str]:

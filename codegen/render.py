@@ -13,13 +13,15 @@ import jinja2
 from ..formulations import BOUND_TOLERANCE, FIXED_TOLERANCE
 from ..solvers.active_set import embedded_source, fixed_size_sources
 from .emit import number
-from .fields import MEMORY
+from .fields import C_NAMES, MEMORY
 from .kernels import padded
 
 if TYPE_CHECKING:
     from .model import StepCode
 
 _INCLUDE = re.compile(r'^#include "([^"]+)"\n', flags=re.MULTILINE)
+# Matrices of the solver's problem, which its struct calls by the letters of formulas, where they are declared or read.
+_MATRICES = re.compile(rf"(?<=->)[{''.join(C_NAMES)}]\b|(?<= \*)[{''.join(C_NAMES)}](?=;)")
 
 
 def library_version() -> str:
@@ -53,7 +55,7 @@ def render_step(code: StepCode) -> dict[str, str]:
     """
     sources = fixed_size_sources()
     values = step_values(code)
-    values |= _of_one_qp(code, sources) if code.single else {"solver_source": embedded_source("KINQP_INLINE")}
+    values |= _of_one_qp(code, sources) if code.single else {"solver_source": general_solver()}
     source = "step.c.j2" if code.single else "cascade.c.j2"
     templates = environment()
     return {
@@ -101,6 +103,7 @@ def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
         "solver_source": _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources),
         "sizes": [{"n": n, "m": m} for n, m in code.sizes],
         "largest": max(n for n, _ in code.sizes),
+        "most_equalities": max(1, *(mode.m_eq for mode in code.single)),
         "kernels": _kernels(code),
         "row_stride": padded(code.rows),
     }
@@ -112,6 +115,11 @@ def render_batch(code: StepCode) -> str:
     memory = [field for field in code.parameters if field.name in MEMORY]
     values = {"p": code.prefix, "nv": code.nv, "m_free": code.m_free, "rows": code.rows}
     return environment().get_template("batch.c.j2").render(values | {"signals": signals, "memory": memory})
+
+
+def general_solver() -> str:
+    """Source of the solver for sizes known at run time, in names that no user's macro replaces; see `C_NAMES`."""
+    return _MATRICES.sub(lambda match: C_NAMES[match[0]], embedded_source("KINQP_INLINE"))
 
 
 def math_header() -> str:

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 TICKS_PER_MODE: Final = 300
-# Where a command builds on the last one it carries on what that one was off by.
-TOLERANCE_WITH_MEMORY: Final = 1e-8
 # The session's stop begins here, in the first mode, and ends so much later [ticks].
 _STOP: Final = (150, 60)
 # What the hand pulls with, along each axis, at most [N, N m].
@@ -81,9 +79,13 @@ def export_guiding(
     code = step_code(robot, made, parsed, prefix)
     files = render_guiding(code, robot, parsed, chosen)
     table = record(robot, made, parsed, chosen)
-    remembers = any(field.name == "qd_prev" for field in code.inputs)
-    tolerance = number(TOLERANCE_WITH_MEMORY if remembers else TOLERANCE)
-    shared = {"p": prefix, "nv": robot.nv, "tolerance": tolerance, "ticks": len(table["mode"])}
+    shared = {
+        "p": prefix,
+        "nv": robot.nv,
+        "tolerance": number(TOLERANCE),
+        "ticks": len(table["mode"]),
+        "change": any(field.name == "qdd_prev" for field in code.parameters),
+    }
     templates = environment()
     files["guiding_main.c"] = templates.get_template("guiding_main.c.j2").render(shared)
     files["guiding_recorded.h"] = _header(table, prefix)
@@ -139,14 +141,14 @@ def _header(table: dict[str, NDArray[np.float64] | NDArray[np.int64]], prefix: s
         f"#ifndef {guard}",
         f"#define {guard}",
         "",
-        f"enum {{ TICKS = {len(table['mode'])} }};",
+        f"enum {{ recorded_ticks = {len(table['mode'])} }};",
     ]
     for name in ("mode", "stop"):
         values = ", ".join(str(int(value)) for value in table[name])
-        lines += ["", f"static const int recorded_{name}[TICKS] = {{{values}}};"]
+        lines += ["", f"static const int recorded_{name}[recorded_ticks] = {{{values}}};"]
     for name, unit in (("q", "rad or m"), ("wrench", "N, N m"), ("qd", "rad/s or m/s")):
         rows = table[name]
-        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[TICKS][{rows.shape[1]}] = {{"]
+        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[recorded_ticks][{rows.shape[1]}] = {{"]
         lines += [f"    {{{', '.join(number(float(x)) for x in row)}}}," for row in rows]
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])

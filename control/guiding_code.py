@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from ..codegen.emit import emit, number
-from ..codegen.fields import Field, field_of, mode_symbol
+from ..codegen.fields import Field, field_of, mode_symbols
 from ..codegen.render import environment, step_values
 from .guiding_law import HANDED, GuidingLaw
 
@@ -99,12 +99,12 @@ def render_guiding(
         "modes": [
             ModeLaw(
                 str(law.mode),
-                mode_symbol(law.mode),
+                symbol,
                 law.mode.m_fixed,
                 _statements(law, law.law, sources | {"q": "q", "wrench": "wrench"}),
                 _statements(law, law.guided, sources | {"q": "q", "qd_prev": "qd"}),
             )
-            for law in laws
+            for law, symbol in zip(laws, mode_symbols(modes), strict=True)
         ],
     }
     templates = environment()

@@ -9,6 +9,17 @@
 #error "kinqp: compile without -ffast-math, -Ofast and -ffinite-math-only; numbers have to behave as IEEE 754 says"
 #endif
 
+/* What the bounds of arrays rest on; looked at only where KINQP_DEBUG is defined. */
+#if defined(KINQP_ASSERT)
+#elif defined(KINQP_DEBUG)
+#include <stdio.h>
+#include <stdlib.h>
+#define KINQP_ASSERT(holds) \
+    ((holds) ? (void)0 : (fprintf(stderr, "%s:%d: expected %s\n", __FILE__, __LINE__, #holds), abort()))
+#else
+#define KINQP_ASSERT(holds) ((void)0)
+#endif
+
 #if defined(__GNUC__)
 /* Not every library needs every one of these. */
 #define KINQP_INLINE static inline __attribute__((unused))
@@ -91,9 +102,10 @@ KINQP_INLINE void kinqp_add_times(double share, const kinqp_lanes *x, kinqp_lane
 KINQP_INLINE void kinqp_multiply(double share, kinqp_lanes *x) {
     for (int i = 0; i < KINQP_PARTS; ++i) x->at[i] *= kinqp_part_fill(share);
 }
-/* Sum of the products of n pairs of numbers, n a multiple of four. */
+/* Sum of the products of n pairs of numbers, n a multiple of four, at least four. */
 KINQP_INLINE double kinqp_dot_padded(int n, const double *a, const double *b) {
     kinqp_lanes sum;
+    KINQP_ASSERT(n >= 4 && n % 4 == 0);
     for (int i = 0; i < KINQP_PARTS; ++i)
         sum.at[i] = kinqp_part_load(a + i * KINQP_WIDTH) * kinqp_part_load(b + i * KINQP_WIDTH);
     for (int k = 4; k < n; k += 4)

@@ -107,7 +107,8 @@ KINQP_INLINE void kinqp_sincos(int n, const double *x, double *sine, double *cos
         }
         return;
     }
-    /* As many at a time as a vector holds; the last ones overlap those before, so that nothing is left over. */
+    /* As many at a time as a vector holds; the last ones overlap those before, so that nothing is left over: with
+     * n >= KINQP_WIDTH all of first .. first + KINQP_WIDTH - 1 are within the n. */
     for (int block = 0; block < n; block += KINQP_WIDTH) {
         const int first = block + KINQP_WIDTH <= n ? block : n - KINQP_WIDTH;
         kinqp_sincos_near(x + first, sine + first, cosine + first);

@@ -35,7 +35,7 @@ COMMANDS = r"""
 int main(void) {
     PREFIX_parameters parameters;
     PREFIX_default_parameters(&parameters);
-    for (int tick = 0; tick < TICKS; ++tick) {
+    for (int tick = 0; tick < recorded_ticks; ++tick) {
         PREFIX_input input = {0};
         PREFIX_output output;
         input.mode = recorded_mode[tick];

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from kinqp.codegen import compile_step
-from kinqp.codegen.fields import identifier
+from kinqp.codegen.fields import identifier, mode_symbols
 from kinqp.codegen.model import StepCode, step_code
 from kinqp.codegen.render import render_step
 from kinqp.codegen.step import STEP_FLAGS
@@ -240,3 +240,40 @@ def test_identifiers_are_plain_c() -> None:
     symbols = [mode.symbol for mode in several("cartesian-error", *MODES).modes]
     assert len(set(symbols)) == len(MODES)
     assert all(re.fullmatch(r"[a-z][a-z0-9_]*", symbol) for symbol in symbols)
+
+
+TWINS = ("plane:0.1,0,5", "plane:0,1,0.5", "plane:-0.1,0,5", "plane:0,-1,0.5", "rcm:1e-3", "rcm:1e+30", "rcm:0.1")
+
+
+def test_modes_have_symbols_of_their_own() -> None:
+    """Names that are public stay as they are; modes that would have the same one spell out their decimal points."""
+    modes = [Mode.parse(text) for text in (*MODES, *TWINS, "plane:0,1,0.5@tool", "line:z@world", "fix-position@tool")]
+    symbols = dict(zip(map(str, modes), mode_symbols(modes), strict=True))
+    assert len(set(symbols.values())) == len(modes)
+    assert all(re.fullmatch(r"[a-z][a-z0-9_]*", symbol) for symbol in symbols.values())
+    assert symbols["plane:0.1,0,5"] == "plane_0p1_0_5"
+    assert symbols["plane:0,1,0.5"] == "plane_0_1_0p5"
+    assert symbols["rcm:-0.12"] == "rcm_m0_12"
+    assert symbols["plane:1,-2,0.5"] == "plane_1_m2_0_5"
+    assert mode_symbols(modes[::-1]) == tuple(symbols.values())[::-1]
+    for one in modes[:7]:
+        assert mode_symbols([one]) == (symbols[str(one)],)
+
+
+def test_any_number_and_any_name_of_a_mode_is_a_symbol() -> None:
+    rng = np.random.default_rng(0)
+    numbers = [0.0, -0.0, 1.0, -1.0, 0.1, 1e-3, 1e20, -1e-20, 12.0, 1.2, *rng.choice([-1.0, 1.0], 8) / 3.0]
+    planes = [Mode.plane(normal) for normal in rng.choice(numbers, (3000, 3)) if np.any(normal)]
+    own = [Mode(name, (0,), (1,)) for name in ("ebene", "Ebene", "\u00e4", "\u00f6", "*/", "9 lives", "")]
+    modes = [*{str(mode): mode for mode in planes}.values(), *own]
+    assert len(modes) > 1000
+    symbols = mode_symbols(modes)
+    assert len(set(symbols)) == len(modes)
+    # A digit may come first: the prefix of the library stands before it.
+    assert all(re.fullmatch(r"[a-z0-9][a-z0-9_]*", symbol) for symbol in symbols)
+
+
+def test_modes_of_one_plain_name_build_into_one_library(tmp_path: Path) -> None:
+    made = several("cartesian-error", *TWINS[:2])
+    source = write(tmp_path, made)
+    run(need("gcc"), *STRICT, "-fsyntax-only", source.name, cwd=tmp_path)

@@ -3,6 +3,7 @@ KINQP_INLINE int kinqp_padded(int n) { return (n + 3) / 4 * 4; }
 
 /* out := a + share * b, over a multiple of four entries. */
 KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const double *b, double *out) {
+    KINQP_ASSERT(n % 4 == 0);
     for (int i = 0; i < n; i += 4) {
         kinqp_lanes x;
         kinqp_load(a + i, &x);
@@ -14,27 +15,28 @@ KINQP_INLINE void kinqp_add_padded(int n, const double *a, double share, const d
 /* inverse (m, m) := the inverse of a symmetric positive definite matrix, m <= 6, by L D L' without pivoting. Returns the
  * product of the shares of its diagonal entries that are left as pivots: 1 for orthogonal rows, 0 for dependent ones. */
 KINQP_INLINE double kinqp_inverse_by_factors(int m, const double *matrix, double *inverse) {
-    double L[36], scaled[36], reciprocal[6], independence = 1.0;
+    double factor[36], scaled[36], reciprocal[6], independence = 1.0;
+    KINQP_ASSERT(m <= 6); /* rows of a twist */
     for (int j = 0; j < m; ++j) {
         for (int i = j; i < m; ++i) {
             double value = matrix[i * m + j];
-            for (int k = 0; k < j; ++k) value -= L[i * m + k] * scaled[j * m + k];
+            for (int k = 0; k < j; ++k) value -= factor[i * m + k] * scaled[j * m + k];
             scaled[i * m + j] = value;
         }
         const double pivot = scaled[j * m + j];
         independence *= pivot / matrix[j * m + j];
         reciprocal[j] = 1.0 / pivot;
-        for (int i = j + 1; i < m; ++i) L[i * m + j] = scaled[i * m + j] * reciprocal[j];
+        for (int i = j + 1; i < m; ++i) factor[i * m + j] = scaled[i * m + j] * reciprocal[j];
     }
     for (int c = 0; c < m; ++c) {
         double x[6];
         for (int i = c; i < m; ++i) {
             x[i] = i == c ? 1.0 : 0.0;
-            for (int k = c; k < i; ++k) x[i] -= L[i * m + k] * x[k];
+            for (int k = c; k < i; ++k) x[i] -= factor[i * m + k] * x[k];
         }
         for (int i = m - 1; i >= c; --i) {
             x[i] *= reciprocal[i];
-            for (int k = i + 1; k < m; ++k) x[i] -= L[k * m + i] * x[k];
+            for (int k = i + 1; k < m; ++k) x[i] -= factor[k * m + i] * x[k];
         }
         for (int i = c; i < m; ++i) inverse[i * m + c] = inverse[c * m + i] = x[i];
     }

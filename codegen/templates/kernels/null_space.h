@@ -1,17 +1,20 @@
-/* Householder reflections that take m rows A over n columns (padded) to a triangle, the largest row next; m <= n.
+/* Householder reflections that take m rows over n columns (padded) to a triangle, the largest row next. There
+ * may be more rows than columns: the rank is at most n.
  *
- * A: overwritten by the reflections, in the order `order`, with factors beta (m,). along (m,): the smallest solution of
- * A x = b in the axes that the reflections give. Returns the rank, or -1 if the equalities contradict each other by more
+ * rows: overwritten by the reflections, in the order `order`, with factors beta (m,). along (m,): the smallest solution of
+ * rows x = b in the axes that the reflections give. Returns the rank, or -1 if the equalities contradict each other by more
  * than 1e-9. A row counts as dependent below 1e-10 of its length. */
-KINQP_INLINE int kinqp_reflect(int m, int n, double *A, const double *b, double *beta, double *along, int *order) {
+KINQP_INLINE int kinqp_reflect(int m, int n, double *rows, const double *b, double *beta, double *along, int *order) {
     const int stride = kinqp_padded(n);
-    double length2[KINQP_LARGEST], rest2[KINQP_LARGEST], triangle[KINQP_LARGEST * KINQP_LARGEST], head[KINQP_LARGEST];
+    double length2[KINQP_EQUALITIES], rest2[KINQP_EQUALITIES], triangle[KINQP_EQUALITIES * KINQP_LARGEST], head[KINQP_LARGEST];
+    const int most = m < n ? m : n;
     int rank = 0;
+    KINQP_ASSERT(m <= KINQP_EQUALITIES && n <= KINQP_LARGEST);
     for (int i = 0; i < m; ++i) {
-        length2[i] = rest2[i] = kinqp_dot_padded(stride, A + i * stride, A + i * stride);
+        length2[i] = rest2[i] = kinqp_dot_padded(stride, rows + i * stride, rows + i * stride);
         order[i] = i;
     }
-    for (; rank < m; ++rank) {
+    for (; rank < most; ++rank) {
         /* The row with the largest share still outside the span of those before. */
         int best = -1;
         double rest = 1e-20, whole = 1.0;
@@ -26,16 +29,16 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *A, const double *b, double 
         const int chosen = order[best];
         order[best] = order[rank];
         order[rank] = chosen;
-        /* The reflection that takes the rest of this row to a multiple of the axis `rank`; its vector stays in the row. */
-        double *row = A + chosen * stride;
+        /* The reflection that takes the rest of this row to a multiple of the axis `rank` < n; its vector stays in the row. */
+        double *row = rows + chosen * stride;
         const double norm = sqrt(rest);
         head[rank] = row[rank] > 0.0 ? -norm : norm;
         row[rank] -= head[rank];
         beta[rank] = 1.0 / (norm * fabs(row[rank]));
         for (int i = rank + 1; i < m; ++i) {
-            double *other = A + order[i] * stride;
+            double *other = rows + order[i] * stride;
             kinqp_add_padded(stride, other, -beta[rank] * kinqp_dot_padded(stride, row, other), row, other);
-            triangle[order[i] * m + rank] = other[rank];
+            triangle[order[i] * most + rank] = other[rank];
             other[rank] = 0.0;
             rest2[order[i]] = kinqp_dot_padded(stride, other, other);
         }
@@ -44,8 +47,8 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *A, const double *b, double 
     for (int i = 0; i < m; ++i) {
         double value = b[order[i]], terms = fabs(value);
         for (int k = 0; k < (i < rank ? i : rank); ++k) {
-            value -= triangle[order[i] * m + k] * along[k];
-            terms += fabs(triangle[order[i] * m + k] * along[k]);
+            value -= triangle[order[i] * most + k] * along[k];
+            terms += fabs(triangle[order[i] * most + k] * along[k]);
         }
         if (i < rank) along[i] = value / head[i];
         else if (!(fabs(value) <= 1e-9 * (terms + sqrt(length2[order[i]])))) return -1;
@@ -53,29 +56,30 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *A, const double *b, double 
     return rank;
 }
 
-/* Z (n, width): an orthonormal basis of the null space in its first n - rank columns, the others zero, by the reflections
- * of kinqp_reflect on the axes that belong to it. x (n,): the smallest solution of A x = b. */
-KINQP_INLINE void kinqp_null_basis(int n, int rank, int width, const double *A, const double *beta, const double *along,
-                                    const int *order, double *Z, double *x) {
+/* basis (n, width): an orthonormal basis of the null space in its first n - rank columns, the others zero, by the reflections
+ * of kinqp_reflect on the axes that belong to it. x (n,): the smallest solution of rows x = b. */
+KINQP_INLINE void kinqp_null_basis(int n, int rank, int width, const double *rows, const double *beta, const double *along,
+                                    const int *order, double *basis, double *x) {
     const int stride = kinqp_padded(n);
     int moved = 0;
+    KINQP_ASSERT(rank <= n && width % 4 == 0 && n - rank <= width);
     for (int i = 0; i < n; ++i) {
-        for (int j = 0; j < width; ++j) Z[i * width + j] = i == j + rank ? 1.0 : 0.0;
+        for (int j = 0; j < width; ++j) basis[i * width + j] = i == j + rank ? 1.0 : 0.0;
         x[i] = i < rank ? along[i] : 0.0;
         moved |= x[i] < 0.0 || x[i] > 0.0;
     }
     for (int k = rank - 1; k >= 0; --k) {
-        const double *row = A + order[k] * stride;
+        const double *row = rows + order[k] * stride;
         for (int c = 0; c < width; c += 4) {
             kinqp_lanes shares, entry;
             double some[4];
-            kinqp_scaled(row[k], Z + k * width + c, &shares);
-            for (int i = k + 1; i < n; ++i) kinqp_add_scaled(row[i], Z + i * width + c, &shares);
+            kinqp_scaled(row[k], basis + k * width + c, &shares);
+            for (int i = k + 1; i < n; ++i) kinqp_add_scaled(row[i], basis + i * width + c, &shares);
             kinqp_store(some, &shares);
             for (int i = k; i < n; ++i) {
-                kinqp_load(Z + i * width + c, &entry);
+                kinqp_load(basis + i * width + c, &entry);
                 kinqp_add_scaled(-beta[k] * row[i], some, &entry);
-                kinqp_store(Z + i * width + c, &entry);
+                kinqp_store(basis + i * width + c, &entry);
             }
         }
         if (moved) {

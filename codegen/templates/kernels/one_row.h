@@ -9,6 +9,7 @@ KINQP_INLINE int kinqp_one_row(int n, int m, const double *columns, const double
                                double *score) {
     const int stride = kinqp_padded(m);
     double scores[KINQP_ROWS], best = 0.0, around = 0.0;
+    KINQP_ASSERT(stride <= KINQP_ROWS);
     const kinqp_part zero = kinqp_part_fill(0.0), one = kinqp_part_fill(1.0);
     int usable = 1, row = -1;
     for (int b = 0; b < stride; b += KINQP_WIDTH) {

@@ -2,6 +2,7 @@
 KINQP_INLINE void kinqp_thesis_bounds(int n, const double *q, const double *q_min, const double *q_max,
                                        const double *qd_max, const double *qdd_max, double dt, double *lo, double *hi) {
     double distance[2 * KINQP_MOST], bound[2 * KINQP_MOST], most[2 * KINQP_MOST], twice[2 * KINQP_MOST];
+    KINQP_ASSERT(n <= KINQP_MOST);
     for (int i = 0; i < n; ++i) {
         distance[i] = q[i] - q_min[i];
         distance[n + i] = q_max[i] - q[i];

@@ -17,7 +17,8 @@ KINQP_INLINE void kinqp_viable_bounds(int n, const double *q, const double *q_mi
                                        const double *qd_max, const double *qdd_max, double dt, double *lo, double *hi) {
     const kinqp_part period = kinqp_part_fill(dt), half = kinqp_part_fill(0.5), one = kinqp_part_fill(1.0);
     double given[5][KINQP_WIDTH];
-    /* As many joints at a time as a vector holds; the last ones overlap those before, so that nothing is left over. */
+    /* As many joints at a time as a vector holds; the last ones overlap those before, so that nothing is left over. Fewer
+     * joints than that go by way of `given`, since a whole vector is read and written. */
     for (int block = 0; block < n; block += KINQP_WIDTH) {
         const int first = block + KINQP_WIDTH <= n || n < KINQP_WIDTH ? block : n - KINQP_WIDTH;
         const double *fields[5] = {q + first, q_min + first, q_max + first, qd_max + first, qdd_max + first};
