@@ -13,6 +13,9 @@
 #define KINQP_REFINEMENTS 4         /* refinements per pass at most [count] */
 #define KINQP_MARGIN 0.01           /* proximal passes aim for this share of the tolerance [-] */
 #define KINQP_MARGIN_PASSES 6       /* passes granted for that once the tolerance itself is met [count] */
+#define KINQP_EXACT_PASSES 6        /* passes where none should be needed but the first [count] */
+#define KINQP_NEARLY 1e-3           /* residual below which a proximal pass goes on from the refined point [-] */
+#define KINQP_SLACK 0.01            /* share of the tolerance that a row may be outside before it is taken up again [-] */
 #define KINQP_GRADIENT_SHARE 0.01   /* of the gradient's length counts as length of the data [-] */
 
 kinqp_qp_options kinqp_qp_default_options(int n, int p, int m) {
@@ -43,7 +46,7 @@ static size_t core_doubles(int n, int rows) { return kinqp_as_workspace_size(n, 
 size_t kinqp_qp_workspace_size(int n, int p, int m) {
     if (n < 0 || p < 0 || m < 0) return 0;
     const size_t a = (size_t)n, c = (size_t)m, e = (size_t)p + c + a;
-    const size_t doubles = 5 * a * a + c * a + 2 * e * a + (c + a) * a + 13 * a + c + 3 * e + 5 * (c + a);
+    const size_t doubles = 5 * a * a + c * a + 2 * e * a + (c + a) * a + 13 * a + c + 4 * e + 9 * (c + a);
     const size_t ints = 2 * e + 2 * (c + a) + a;
     return (doubles + core_doubles(n, m + n)) * sizeof(double) + ints * sizeof(int) + 2 * sizeof(double);
 }
@@ -52,15 +55,15 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     double *d = memory;
     const int e = p + m + n, rows = m + n;
     k->n = n;
-    k->H = take(&d, n * n);
-    k->Z = take(&d, n * n);
-    k->K = take(&d, n * n);
-    k->L = take(&d, n * n);
-    k->T = take(&d, n * n);
-    k->C = take(&d, m * n);
-    k->E = take(&d, e * n);
-    k->E0 = take(&d, e * n);
-    k->M = take(&d, rows * n);
+    k->hess = take(&d, n * n);
+    k->basis = take(&d, n * n);
+    k->curv = take(&d, n * n);
+    k->chol = take(&d, n * n);
+    k->white = take(&d, n * n);
+    k->rowmat = take(&d, m * n);
+    k->eqfactor = take(&d, e * n);
+    k->eqmat = take(&d, e * n);
+    k->whiterows = take(&d, rows * n);
     k->scale = take(&d, n);
     k->g = take(&d, n);
     k->tau = take(&d, n);
@@ -82,6 +85,11 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     k->lower = take(&d, rows);
     k->upper = take(&d, rows);
     k->rowz = take(&d, rows);
+    k->noise = take(&d, rows);
+    k->slack = take(&d, rows);
+    k->doubt = take(&d, rows);
+    k->offset = take(&d, rows);
+    k->enoise = take(&d, e);
     k->core = d;
     d += core_doubles(n, rows);
     int *i = (int *)(void *)d;
@@ -96,27 +104,27 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
 static void whiten_vector(const kinqp_qp_work *k, const double *grad, double *v) {
     for (int c = 0; c < k->free; ++c) v[c] = 0.0;
     for (int i = 0; i < k->n; ++i)
-        for (int c = 0; c < k->free; ++c) v[c] += k->T[i * k->free + c] * grad[i];
+        for (int c = 0; c < k->free; ++c) v[c] += k->white[i * k->free + c] * grad[i];
 }
 
 static double row_value(const kinqp_qp_work *k, int row, int m, const double *x) {
     const int id = k->id[row];
-    return id < m ? kinqp_qp_dot(k->C + id * k->n, x, k->n) : x[id - m];
+    return id < m ? kinqp_qp_dot(k->rowmat + id * k->n, x, k->n) : x[id - m];
 }
 
 /* v := T'(H x + g + rows' duals): what stationarity still misses, in whitened coordinates. The equalities' duals have no
  * share in it but for rounding: they are put in so that large terms cancel entry by entry, before T mixes the entries. */
 static void whitened_residual(kinqp_qp_work *k, int m, const double *x, double *v) {
-    for (int i = 0; i < k->n; ++i) k->grad[i] = k->g[i] + kinqp_qp_dot(k->H + i * k->n, x, k->n);
+    for (int i = 0; i < k->n; ++i) k->grad[i] = k->g[i] + kinqp_qp_dot(k->hess + i * k->n, x, k->n);
     for (int j = 0; j < k->state.k; ++j) {
         const int row = k->state.rows[j], id = k->id[row];
         if (id >= m) k->grad[id - m] += k->rowz[row];
-        else for (int i = 0; i < k->n; ++i) k->grad[i] += k->C[id * k->n + i] * k->rowz[row];
+        else for (int i = 0; i < k->n; ++i) k->grad[i] += k->rowmat[id * k->n + i] * k->rowz[row];
     }
     for (int i = 0; i < k->n; ++i) k->s[i] = -k->grad[i];
     kinqp_qp_equality_duals(k, k->s, k->ey);
     for (int r = 0; r < k->equalities; ++r)
-        for (int i = 0; i < k->n; ++i) k->grad[i] += k->E0[r * k->n + i] * k->ey[r];
+        for (int i = 0; i < k->n; ++i) k->grad[i] += k->eqmat[r * k->n + i] * k->ey[r];
     whiten_vector(k, k->grad, v);
 }
 
@@ -138,7 +146,7 @@ static void refine(kinqp_qp_work *k, int m, double *x) {
     for (int i = 0; i < f; ++i) k->w[i] = active < f ? -v[i] : 0.0;
     for (int j = 0; j < active; ++j)
         for (int i = 0; i < f; ++i) k->w[i] += k->state.q[j * f + i] * (active < f ? d[j] + e[j] : e[j]);
-    for (int i = 0; i < k->n; ++i) x[i] += kinqp_qp_dot(k->T + i * f, k->w, f);
+    for (int i = 0; i < k->n; ++i) x[i] += kinqp_qp_dot(k->white + i * f, k->w, f);
     kinqp_qp_restore_equalities(k, x);
     whitened_residual(k, m, x, v);
     for (int j = 0; j < active; ++j) d[j] = kinqp_qp_dot(k->state.q + j * f, v, f);
@@ -160,7 +168,7 @@ static double polish(kinqp_qp_work *k, const kinqp_qp *qp, double *x, kinqp_qp_s
     for (int i = 0; i < KINQP_REFINEMENTS; ++i) {
         refine(k, qp->m, x);
         kinqp_qp_recover(k, qp, x, 0, s);
-        kinqp_qp_residuals(qp, k->scale, s);
+        kinqp_qp_measure(qp, k->scale, KINQP_QP_ROUNDING, s);
         const double now = worst_residual(s);
         if (now <= 1e-13 || !(now < 0.5 * before)) return now;
         before = now;
@@ -171,11 +179,11 @@ static double polish(kinqp_qp_work *k, const kinqp_qp *qp, double *x, kinqp_qp_s
 /* The curvature that proximal weights are relative to: H's, or for a linear cost one that makes steps of data size. */
 static double curvature(const kinqp_qp_work *k) {
     double largest = 0.0, reach = 1.0, slope = 0.0;
-    for (int i = 0; i < k->free; ++i) largest = fmax(largest, k->K[i * k->free + i]);
+    for (int i = 0; i < k->free; ++i) largest = fmax(largest, k->curv[i * k->free + i]);
     if (largest > 1e-12) return largest; /* the scaled Hessian has a unit diagonal or none */
     for (int r = 0; r < k->rows; ++r) {
-        if (fabs(k->lower[r]) <= DBL_MAX) reach = fmax(reach, fabs(k->lower[r]));
-        if (fabs(k->upper[r]) <= DBL_MAX) reach = fmax(reach, fabs(k->upper[r]));
+        if (kinqp_qp_is_finite(k->lower[r])) reach = fmax(reach, fabs(k->lower[r]));
+        if (kinqp_qp_is_finite(k->upper[r])) reach = fmax(reach, fabs(k->upper[r]));
     }
     for (int i = 0; i < k->n; ++i) slope = fmax(slope, fabs(k->g[i]));
     return slope > 0.0 ? slope / reach : 1.0;
@@ -185,7 +193,7 @@ static double curvature(const kinqp_qp_work *k) {
 static double recentre(kinqp_qp_work *k, int m, double shift) {
     double size = 0.0;
     for (int i = 0; i < k->n; ++i) {
-        const double pull = kinqp_qp_dot(k->H + i * k->n, k->x, k->n);
+        const double pull = kinqp_qp_dot(k->hess + i * k->n, k->x, k->n);
         k->grad[i] = k->g[i] + pull;
         size += k->x[i] * (pull + shift * k->x[i]);
     }
@@ -199,31 +207,85 @@ static double recentre(kinqp_qp_work *k, int m, double shift) {
     return size > 0.0 ? sqrt(size) : 0.0;
 }
 
+/* What each row may be outside at the iterate before the core takes it up, and what its bound may be off by. */
+static void set_tolerances(kinqp_qp_work *k, int m, double tolerance) {
+    for (int r = 0; r < k->rows; ++r) {
+        const int id = k->id[r];
+        double terms = 0.0;
+        if (id >= m) terms = fabs(k->x[id - m]);
+        else
+            for (int j = 0; j < k->n; ++j) terms += fabs(k->rowmat[id * k->n + j] * k->x[j]);
+        if (kinqp_qp_is_finite(k->lower[r])) terms = fmax(terms, fabs(k->lower[r]));
+        if (kinqp_qp_is_finite(k->upper[r])) terms = fmax(terms, fabs(k->upper[r]));
+        k->slack[r] = KINQP_SLACK * tolerance * fmax(terms, k->noise[r] * (KINQP_QP_ROUNDING / KINQP_QP_NOISE));
+        k->doubt[r] = KINQP_QP_RELATIVE * terms + k->noise[r];
+    }
+    k->state.slack = k->slack;
+    k->state.noise = k->doubt;
+}
+
+/* Makes the refined point the iterate. Its duals become the core's offset: what is left for it to do is small, and so is
+ * the rounding that it adds, however far away the unconstrained minimiser is. */
+static void continue_from_trial(kinqp_qp_work *k, int m) {
+    for (int r = 0; r < k->rows; ++r) k->offset[r] = k->rowz[r];
+    for (int i = 0; i < k->n; ++i) k->x[i] = k->trial[i];
+    whitened_residual(k, m, k->x, k->centre);
+    for (int c = 0; c < k->free; ++c) k->centre[c] = -k->centre[c];
+    for (int r = 0; r < k->rows; ++r) {
+        const double value = row_value(k, r, m, k->x);
+        k->lo[r] = k->lower[r] - value;
+        k->hi[r] = k->upper[r] - value;
+    }
+    k->state.offset = k->offset;
+}
+
+/* Worst residual where each row and the gradient count at least as at KINQP_QP_UNITS units of x: the noise in data. */
+static double worst_beside_noise(const kinqp_qp_work *k, const kinqp_qp *qp, kinqp_qp_solution *s) {
+    kinqp_qp_measure(qp, k->scale, KINQP_QP_UNITS, s);
+    return worst_residual(s);
+}
+
 /* Outer passes on the reduced problem. */
 static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_options *o, double shift,
                            kinqp_qp_solution *s) {
     const int n = k->n, m = qp->m;
+    const double aim = fmin(o->tolerance, KINQP_QP_RELATIVE);
     kinqp_as_options core = kinqp_as_default_options(k->free, k->rows);
     kinqp_as_result result;
-    int met = 0; /* passes that met the tolerance, but without margin */
+    int met = 0;     /* passes that met the tolerance, but without margin */
+    int refined = 0; /* 1: the iterate is the refined point of the last pass */
+    int disputed = 0; /* 1: the last pass found the rows contradictory, which could not be proved */
     core.warm = o->warm;
     for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
-        core.scale = recentre(k, m, shift);
-        /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
-        core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
+        if (refined) {
+            continue_from_trial(k, m);
+            core.scale = 0.0;
+        } else {
+            k->state.offset = NULL;
+            core.scale = recentre(k, m, shift);
+            /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
+            core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
+        }
+        if (refined || disputed) set_tolerances(k, m, aim);
         core.max_iterations = o->max_iterations - s->iterations;
-        const kinqp_status status =
-            kinqp_as_solve(&k->state, k->M, k->lo, k->hi, k->centre, NULL, &core, k->w, k->rowz, k->sign, &result);
+        const kinqp_status status = kinqp_as_solve(&k->state, k->whiterows, k->lo, k->hi, k->centre, NULL, &core, k->w,
+                                                   k->rowz, k->sign, &result);
         s->iterations += result.iterations;
         core.warm = 1;
         if (status == KINQP_FAILED) return status;
         if (status == KINQP_PRIMAL_INFEASIBLE) {
             kinqp_qp_recover(k, qp, k->x, 1, s);
-            return kinqp_qp_proves_infeasible(qp, s) ? status : KINQP_INACCURATE;
+            if (kinqp_qp_proves_infeasible(qp, s)) return status;
+            if (disputed) return KINQP_INACCURATE;
+            disputed = 1;
+            core.warm = 0;
+            refined = 0;
+            continue;
         }
+        disputed = 0;
         for (int i = 0; i < n; ++i) {
             k->last[i] = k->x[i];
-            k->x[i] += kinqp_qp_dot(k->T + i * k->free, k->w, k->free);
+            k->x[i] += kinqp_qp_dot(k->white + i * k->free, k->w, k->free);
             k->trial[i] = k->x[i];
         }
         if (status == KINQP_MAX_ITERATIONS) {
@@ -231,14 +293,18 @@ static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_
             kinqp_qp_residuals(qp, k->scale, s);
             return status;
         }
-        const double worst = polish(k, qp, k->trial, s);
+        double worst = polish(k, qp, k->trial, s);
         const double share = shift > 0.0 && met < KINQP_MARGIN_PASSES ? KINQP_MARGIN : 1.0;
         if (worst <= share * o->tolerance) return KINQP_SOLVED;
         met += worst <= o->tolerance;
+        /* Only from the second pass on: the first may have stopped where a better point is near. */
+        if (s->passes > 1 && worst_beside_noise(k, qp, s) <= share * o->tolerance) return KINQP_SOLVED;
         if (shift <= 0.0) {
-            if (s->passes >= 3) return KINQP_INACCURATE;
+            if (s->passes >= KINQP_EXACT_PASSES) return KINQP_INACCURATE;
+            refined = 1;
             continue;
         }
+        refined = worst <= KINQP_NEARLY;
         if (s->passes > 1) {
             for (int i = 0; i < n; ++i) k->s[i] = k->scale[i] * (k->x[i] - k->last[i]);
             if (kinqp_qp_proves_unbounded(qp, k->s)) {
