@@ -9,6 +9,7 @@
 #define KINQP_AS_DIMS(s) const int n = (s)->n, m = (s)->m; (void)n; (void)m
 
 #include "kinqp_as_factor.inc"
+#include "kinqp_as_steps.inc"
 #include "kinqp_as_core.inc"
 #include "kinqp_as_primal.inc"
 

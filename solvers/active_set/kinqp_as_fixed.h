@@ -40,6 +40,7 @@ typedef struct {
 } KINQP_AS_STATE;
 
 #include "kinqp_as_factor.inc"
+#include "kinqp_as_steps.inc"
 #include "kinqp_as_core.inc"
 #ifdef KINQP_AS_WITH_PRIMAL
 #include "kinqp_as_primal.inc"

@@ -1,5 +1,4 @@
 /* Dense factorisations of the front end: pivoted Householder for the equalities, pivoted Cholesky for the Hessian. */
-#include <float.h>
 #include <math.h>
 
 #include "kinqp_qp_internal.h"
@@ -17,6 +16,12 @@ double kinqp_qp_power(double value) {
 double kinqp_qp_dot(const double *a, const double *b, int n) {
     double sum = 0.0;
     for (int i = 0; i < n; ++i) sum += a[i] * b[i];
+    return sum;
+}
+
+double kinqp_qp_entries(const double *row, int n) {
+    double sum = 0.0;
+    for (int j = 0; j < n; ++j) sum += fabs(row[j]);
     return sum;
 }
 

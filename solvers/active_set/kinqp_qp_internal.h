@@ -11,7 +11,7 @@
 #define KINQP_QP_RELATIVE 1e-9
 #define KINQP_QP_NOISE 4e-9
 #define KINQP_QP_UNITS (KINQP_QP_NOISE / KINQP_QP_RELATIVE)
-#define KINQP_QP_ROUNDING 1e-6 /* units of x times the tolerance that are rounding, where no noise has to be allowed [-] */
+#define KINQP_QP_ROUNDING 1e-4 /* units of x times the tolerance that are rounding, where no noise has to be allowed [-] */
 
 typedef struct {
     int n;            /* variables [count] */
@@ -89,6 +89,9 @@ double kinqp_qp_power(double value);
 
 double kinqp_qp_dot(const double *a, const double *b, int n);
 
+/* Sum of the absolute entries. */
+double kinqp_qp_entries(const double *row, int n);
+
 /* Householder factorisation of E's rows with row pivoting: fills rank, tau, diagonal, pivot. */
 void kinqp_qp_factor_equalities(kinqp_qp_work *k);
 
@@ -117,5 +120,12 @@ kinqp_status kinqp_qp_reduce(kinqp_qp_work *k, const kinqp_qp *qp, kinqp_qp_solu
 
 /* Writes x and duals of the scaled problem to the caller's arrays; y from stationarity (certificate: of cost 0). */
 void kinqp_qp_recover(kinqp_qp_work *k, const kinqp_qp *qp, const double *x, int certificate, kinqp_qp_solution *s);
+
+/* The curvature that proximal weights are relative to: H's, or for a linear cost one that makes steps of data size. */
+double kinqp_qp_curvature(const kinqp_qp_work *k);
+
+/* Outer passes on the reduced problem. shift: proximal weight that white was made with, 0 where H needs none. */
+kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_options *o, double shift,
+                             kinqp_qp_solution *s);
 
 #endif

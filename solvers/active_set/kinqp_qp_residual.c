@@ -1,11 +1,11 @@
 /* KKT residuals and certificates of the canonical QP, from the caller's data alone. */
-#include <float.h>
 #include <math.h>
 
 #include "kinqp_qp.h"
 #include "kinqp_qp_internal.h"
 
 #define KINQP_CERTIFICATE_TOLERANCE 1e-8 /* relative residual of a certificate [-] */
+#define KINQP_PROOF 0.95                 /* share of the noise in all bounds that a contradiction has to exceed [-] */
 #define KINQP_NET_WEIGHT 2e-3            /* weight of the stationarity residual relative to net sums [-] */
 
 static double lower(const double *bounds, int i) { return bounds ? bounds[i] : -HUGE_VAL; }
@@ -55,9 +55,9 @@ static double longest(const double *row, int n) {
 }
 
 /* What a row's violation is relative to, its bound aside: its terms at x, and its entries times `least` units of x. A row
- * of zeros, whose unit nothing tells, counts absolutely. */
+ * of zeros, whose unit nothing tells, counts as one whose entries sum up to 1. */
 static double reach_of(double terms, double entries, double least) {
-    return entries > 0.0 ? fmax(terms, least * entries) : 1.0;
+    return entries > 0.0 ? fmax(terms, least * entries) : fmax(least, 1.0);
 }
 
 void kinqp_qp_measure(const kinqp_qp *qp, const double *scale, double least, kinqp_qp_solution *s) {
@@ -116,32 +116,25 @@ static int support(double z, double l, double u, double entries, double *sum, do
     if (!(z < 0.0) && !(z > 0.0)) return !kinqp_qp_is_nan(z);
     if (!kinqp_qp_is_finite(bound)) return 0;
     *sum += z * bound;
-    *noise += fabs(z) * (KINQP_QP_RELATIVE * fabs(bound) + KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0));
+    *noise += fabs(z) * fmax(KINQP_QP_RELATIVE * fabs(bound), KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0));
     return 1;
 }
 
-/* Sum of the absolute entries. */
-static double total(const double *row, int n) {
-    double sum = 0.0;
-    for (int j = 0; j < n; ++j) sum += fabs(row[j]);
-    return sum;
-}
-
 int kinqp_qp_crossed(double l, double u, double entries) {
-    return l - u > KINQP_QP_RELATIVE * (fabs(l) + fabs(u)) + 2.0 * KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0);
+    return l - u > 2.0 * fmax(KINQP_QP_RELATIVE * fmax(fabs(l), fabs(u)), KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0));
 }
 
 int kinqp_qp_proves_infeasible(const kinqp_qp *qp, const kinqp_qp_solution *s) {
     const int n = qp->n;
     double sum = 0.0, noise = 0.0, most = 0.0, largest = 0.0;
     for (int i = 0; i < qp->m; ++i)
-        if (kinqp_qp_crossed(lower(qp->l, i), upper(qp->u, i), total(qp->C + i * n, n))) return 1;
+        if (kinqp_qp_crossed(lower(qp->l, i), upper(qp->u, i), kinqp_qp_entries(qp->C + i * n, n))) return 1;
     for (int i = 0; i < n; ++i)
         if (kinqp_qp_crossed(lower(qp->lb, i), upper(qp->ub, i), 1.0)) return 1;
     for (int i = 0; i < qp->p; ++i)
-        if (!support(s->y[i], qp->b[i], qp->b[i], total(qp->A + i * n, n), &sum, &noise)) return 0;
+        if (!support(s->y[i], qp->b[i], qp->b[i], kinqp_qp_entries(qp->A + i * n, n), &sum, &noise)) return 0;
     for (int i = 0; i < qp->m; ++i)
-        if (!support(s->z[i], lower(qp->l, i), upper(qp->u, i), total(qp->C + i * n, n), &sum, &noise)) return 0;
+        if (!support(s->z[i], lower(qp->l, i), upper(qp->u, i), kinqp_qp_entries(qp->C + i * n, n), &sum, &noise)) return 0;
     for (int i = 0; i < n; ++i)
         if (!support(s->z_box[i], lower(qp->lb, i), upper(qp->ub, i), 1.0, &sum, &noise)) return 0;
     for (int j = 0; j < n; ++j) {
@@ -157,7 +150,7 @@ int kinqp_qp_proves_infeasible(const kinqp_qp *qp, const kinqp_qp_solution *s) {
         most = worse(most, fabs(value));
         largest = worse(largest, part);
     }
-    return most <= KINQP_CERTIFICATE_TOLERANCE * largest && sum < -0.5 * noise;
+    return most <= KINQP_CERTIFICATE_TOLERANCE * largest && sum < -KINQP_PROOF * noise;
 }
 
 /* 1 if a row with this slope may be followed for ever; size: the slope's largest possible term. */

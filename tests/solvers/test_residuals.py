@@ -83,7 +83,9 @@ def test_a_row_of_zeros() -> None:
     possible = QP(H=np.eye(1), g=[0], C=[[0]], l=[0], u=[0])
     assert residuals(possible, vec(0), NONE, vec(0), vec(0)).worst_scaled == 0
     impossible = QP(H=np.eye(1), g=[0], C=[[0]], l=[1], u=[2])
-    assert residuals(impossible, vec(0), NONE, vec(0), vec(0)).primal_scaled > 1e6
+    assert residuals(impossible, vec(0), NONE, vec(0), vec(0)).primal_scaled == 1
+    rounding = QP(H=np.eye(1), g=[0], C=[[0]], u=[-7e-18])
+    assert residuals(rounding, vec(0), NONE, vec(0), vec(0)).worst_scaled < 1e-16
 
 
 def test_zero_cost_is_no_division_by_zero() -> None:
