@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from numbers import Integral, Real
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ class UnknownOptionError(TypeError):
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float if it is a finite positive number, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (0.0 < value < math.inf):
+    if isinstance(value, bool) or not isinstance(value, Real) or not (0.0 < value < math.inf):
         raise OptionError(f"{name} must be a positive number, but is {value!r}.")
     return float(value)
 
@@ -35,10 +36,10 @@ def gap_tolerance(tolerance: float) -> float:
 
 
 def count(name: str, value: int) -> int:
-    """Return `value` if it is an integer of at least 1, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+    """Return `value` as an int if it is an integer, of Python or NumPy, of at least 1, else raise `OptionError`."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
         raise OptionError(f"{name} must be an integer of at least 1, but is {value!r}.")
-    return value
+    return int(value)
 
 
 def flag(name: str, value: object) -> bool:

@@ -195,7 +195,10 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
         if (status == KINQP_PRIMAL_INFEASIBLE) {
             kinqp_qp_recover(k, qp, k->x, 1, s);
             if (kinqp_qp_proves_infeasible(qp, s)) return status;
-            if (disputed) return KINQP_INACCURATE;
+            if (disputed) {
+                s->primal = HUGE_VAL; /* neither a point nor a proof */
+                return KINQP_INACCURATE;
+            }
             disputed = 1;
             core.warm = 0;
             refined = 0;

@@ -141,11 +141,10 @@ class ActiveSet(Solver):
                 iterations=answer.iterations,
                 message="The data hold NaN, an infinity or an impossible bound, or H is not symmetric or not convex.",
             )
-        crossed = bool((qp.lower > qp.upper).any())
         certificate: FarkasCertificate | UnboundedRay | None = None
         message = "The problem is unbounded below."
-        if claimed is Status.PRIMAL_INFEASIBLE and crossed:
-            # What two multipliers of opposite sign would prove, one multiplier per row cannot say.
+        if claimed is Status.PRIMAL_INFEASIBLE and not self._multipliers.any():
+            # Bounds that cross. What two multipliers of opposite sign would prove, one multiplier per row cannot say.
             message = "A lower bound lies above its upper bound."
         elif claimed is Status.PRIMAL_INFEASIBLE:
             certificate = FarkasCertificate(self._y.copy(), self._z.copy(), self._z_box.copy())
@@ -154,6 +153,11 @@ class ActiveSet(Solver):
             certificate = UnboundedRay(self._x.copy())
         elif claimed is Status.MAX_ITERATIONS:
             message = f"No convergence within {self._options.max_iterations} iterations."
+        elif not (answer.primal < np.inf):
+            message = (
+                "The rows seem to contradict each other, but by so little beside the rounding in them that it could not be "
+                "proved; no point was found that satisfies them either."
+            )
         else:
             message = (
                 f"After {answer.passes} passes the relative residuals are primal {answer.primal:.1e}, "
