@@ -36,13 +36,15 @@ class QP:
     infinite bound means that this side is absent.
 
     Construct with keywords; everything but ``H`` and ``g`` may be left out. All arrays are copied, float64,
-    C-contiguous and read-only. Bounds that cross by rounding alone are set to their middle. The constraints are also there in one piece, equalities first and box last, as
-    ``lower <= stacked @ x <= upper`` with ``stacked = [A; C; I]``; A, b, C, l, u, lb and ub are views of it.
+    C-contiguous and read-only; bounds that cross by rounding alone are set to their middle. The constraints are also
+    there in one piece, equalities first and box last, as ``lower <= stacked @ x <= upper`` with
+    ``stacked = [A; C; I]``; A, b, C, l, u, lb and ub are views of it.
 
     Parameters
     ----------
     H
-        Hessian, symmetric positive semi-definite, shape (n, n).
+        Hessian, symmetric positive semi-definite, shape (n, n). Of an array in single precision the rounding of that is
+        allowed for, and negative eigenvalues within it are lifted to zero.
     g
         Linear cost, shape (n,).
     A, b

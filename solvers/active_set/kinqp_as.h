@@ -36,6 +36,8 @@ typedef struct {
     double scaling;      /* share kept of the way from the admissible point to the iterate; 1: not scaled [-] */
 } kinqp_as_result;
 
+/* Why indices stay inside: at most n rows are active at once, since a row enters only if it is independent of those that
+ * are, and the loops over rows end at m. Where k is compared with n (append, drop, enter) it says more. */
 typedef struct {
     int n;               /* columns of M [count] */
     int m;               /* rows of M [count] */

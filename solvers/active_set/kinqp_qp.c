@@ -46,6 +46,7 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     double *d = memory;
     const int e = p + m + n, rows = m + n;
     k->n = n;
+    k->limit = e;
     k->hess = take(&d, n * n);
     k->basis = take(&d, n * n);
     k->curv = take(&d, n * n);
@@ -89,6 +90,8 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     k->id = take_int(&i, rows);
     k->sign = take_int(&i, rows);
     k->kpivot = take_int(&i, n);
+    /* The sizes taken are those that kinqp_qp_workspace_size adds up. */
+    KINQP_ASSERT((char *)i <= (char *)memory + kinqp_qp_workspace_size(n, p, m));
 }
 
 static void clear(const kinqp_qp *qp, kinqp_qp_solution *s) {
@@ -110,7 +113,9 @@ kinqp_status kinqp_qp_solve(const kinqp_qp *qp, const kinqp_qp_options *o, void 
     if (status == KINQP_SOLVED) status = kinqp_qp_reduce(k, qp, s);
     if (status != KINQP_SOLVED) return status;
     for (int r = 0; r < k->rows; ++r) k->sign[r] = o->warm ? s->active[k->id[r]] : 0;
-    kinqp_as_setup(&k->state, k->free, k->rows, k->core);
+    KINQP_ASSERT(k->rank >= 0 && k->rank <= k->n && k->rank <= k->equalities && k->free == k->n - k->rank);
+    KINQP_ASSERT(k->rows >= 0 && k->rows <= qp->m + qp->n && k->equalities + k->rows <= k->limit);
+    kinqp_as_setup(&k->state, k->free, k->rows, k->core); /* in memory for n columns and m + n rows: enough for fewer */
     const double ratio = kinqp_qp_cholesky(k, 0.0);
     if (!(ratio >= -KINQP_CONVEX_TOLERANCE)) return KINQP_FAILED;
     if (ratio < KINQP_FLAT) {

@@ -46,9 +46,9 @@ typedef struct {
     int *active;     /* out (m + n,): -1, 0, +1 for the rows of C, then the box; in if warm [sign] */
     int iterations;  /* out: active-set steps over all passes [count] */
     int passes;      /* out: outer passes [count] */
-    double primal;   /* out: largest violation of a row, relative to its bound or its terms, whichever is more, and to no
-                      * less than the row's entries sum up to times a ten-thousandth or, where data contradict themselves
-                      * by noise, four units of x; infinite: rows contradict each other, but not provably [-] */
+    double primal;   /* out: largest violation of a row, relative to its bound or its terms, whichever is more, but to no
+                      * less than the row at a ten-thousandth of a unit of x or, where data contradict themselves by
+                      * noise, at four units; infinite: rows contradict each other, but not provably [-] */
     double dual;         /* out: largest stationarity residual in scaled variables, relative to the largest terms; or,
                           * where worse, 2e-3 of it as given, relative to the largest of |H|, |Hx|, |g|, |A'y..| [-] */
     double gap;      /* out: largest complementarity product, relative to the largest term of the objective [-] */
@@ -64,8 +64,9 @@ size_t kinqp_qp_workspace_size(int n, int p, int m);
 kinqp_status kinqp_qp_solve(const kinqp_qp *qp, const kinqp_qp_options *options, void *memory,
                             kinqp_qp_solution *solution);
 
-/* Fills solution->primal, dual and gap from x, y, z, z_box and the data alone, small rows at four units of x. scale: unit of each variable (n,),
- * NULL: all 1; kinqp_qp_solve uses 1 / sqrt(H_jj), or 1 / the column's largest entry, rows brought to one size, where H_jj is 0. */
+/* Fills solution->primal, dual and gap from x, y, z, z_box and the data alone, small rows at four units of x. scale: unit
+ * of each variable (n,), NULL: all 1; kinqp_qp_solve uses 1 / sqrt(H_jj), or where H_jj is 0 one over the column's largest
+ * entry once rows are brought to one size. */
 void kinqp_qp_residuals(const kinqp_qp *qp, const double *scale, kinqp_qp_solution *solution);
 
 /* 1 if y, z, z_box prove that no point is feasible: A'y + C'z + z_box = 0 with a support value that is negative by more

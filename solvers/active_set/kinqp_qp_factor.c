@@ -51,6 +51,7 @@ void kinqp_qp_factor_equalities(kinqp_qp_work *k) {
             }
         }
         if (best < 0) return;
+        KINQP_ASSERT(j < n && best >= j && best < count); /* the loop ends at n: rank <= n */
         const int chosen = k->pivot[best];
         k->pivot[best] = k->pivot[j];
         k->pivot[j] = chosen;

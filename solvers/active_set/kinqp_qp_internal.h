@@ -13,12 +13,16 @@
 #define KINQP_QP_UNITS (KINQP_QP_NOISE / KINQP_QP_RELATIVE)
 #define KINQP_QP_ROUNDING 1e-4 /* units of x times the tolerance that are rounding, where no noise has to be allowed [-] */
 
+/* Why indices stay inside: equalities + rows <= limit = p + m + n, as kinqp_qp_scale makes at most one of each row of A,
+ * row of C and variable, rows only of the latter two; rank <= min(n, equalities), so free = n - rank is in 0..n; the
+ * core's active rows are at most free. eid, id, pivot and kpivot hold indices that these loops have written. */
 typedef struct {
     int n;            /* variables [count] */
     int free;         /* dimension left by the equalities [count] */
     int equalities;   /* rows in E: A, then rows with equal bounds [count] */
     int rank;         /* independent equalities [count] */
     int rows;         /* two-sided rows handed to the core [count] */
+    int limit;        /* p + m + n: equalities and rows together, each of which is one or the other or absent [count] */
     int costless;     /* 1: H and g are zero, so all duals are [flag] */
     double *scale;    /* x = scale * scaled x, powers of two (n,) */
     double *cscale;   /* factors of C's rows, powers of two (m,) */

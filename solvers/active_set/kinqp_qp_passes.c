@@ -8,7 +8,7 @@
 #define KINQP_MARGIN 0.01           /* proximal passes aim for this share of the tolerance [-] */
 #define KINQP_MARGIN_PASSES 6       /* passes granted for that once the tolerance itself is met [count] */
 #define KINQP_EXACT_PASSES 6        /* passes where none should be needed but the first [count] */
-#define KINQP_PASSES_UNTIL_RELAXED 3 /* passes after which rows that are still outside are taken to contradict others [count] */
+#define KINQP_PASSES_UNTIL_RELAXED 3 /* passes after which a row that is still outside is taken to contradict others [count] */
 #define KINQP_RELAXATION 0.9        /* share of the noise in a bound by which it is moved then [-] */
 #define KINQP_NEARLY 1e-3           /* residual below which a proximal pass goes on from the refined point [-] */
 #define KINQP_SLACK 0.01            /* share of the tolerance that a row may be outside before it is taken up again [-] */
@@ -23,6 +23,7 @@ static void whiten_vector(const kinqp_qp_work *k, const double *grad, double *v)
 
 static double row_value(const kinqp_qp_work *k, int row, int m, const double *x) {
     const int id = k->id[row];
+    KINQP_ASSERT(row >= 0 && row < k->rows && id >= 0 && id < m + k->n);
     return id < m ? kinqp_qp_dot(k->rowmat + id * k->n, x, k->n) : x[id - m];
 }
 
@@ -44,7 +45,8 @@ static void whitened_residual(kinqp_qp_work *k, int m, const double *x, double *
 
 /* x += a Newton step on the face of the core's active set, duals likewise; both as corrections of residuals. */
 static void refine(kinqp_qp_work *k, int m, double *x) {
-    const int f = k->free, active = k->state.k;
+    const int f = k->free, active = k->state.k; /* active <= f: see the core */
+    KINQP_ASSERT(active >= 0 && active <= f);
     double *v = k->v, *e = k->state.u, *d = k->state.d;
     whitened_residual(k, m, x, v);
     for (int j = 0; j < active; ++j) {

@@ -8,6 +8,7 @@ static void scatter_equalities(const kinqp_qp_work *k, const kinqp_qp *qp, kinqp
     for (int i = 0; i < k->equalities; ++i) {
         const double value = k->ey[i] * k->efactor[i];
         const int id = k->eid[i];
+        KINQP_ASSERT(id >= 0 && id < k->limit);
         if (id < qp->p) s->y[id] = value;
         else if (id < qp->p + qp->m) s->z[id - qp->p] = value;
         else s->z_box[id - qp->p - qp->m] = value;
@@ -25,6 +26,7 @@ void kinqp_qp_recover(kinqp_qp_work *k, const kinqp_qp *qp, const double *x, int
     for (int i = 0; i < qp->m + n; ++i) s->active[i] = 0;
     for (int r = 0; r < k->rows; ++r) {
         const int id = k->id[r];
+        KINQP_ASSERT(id >= 0 && id < qp->m + n);
         const double z = k->costless && !certificate ? 0.0 : k->rowz[r];
         s->active[id] = k->sign[r];
         if (z == 0.0) continue;
@@ -119,7 +121,7 @@ static int remove_fixed(kinqp_qp_work *k, const kinqp_qp *qp, kinqp_qp_solution 
             k->rowz[r] = 0.0;
             continue; /* no proof: the residuals will say how far it is outside */
         }
-        k->id[kept] = id;
+        k->id[kept] = id; /* kept <= r */
         k->lower[kept] = k->lower[r];
         k->upper[kept] = k->upper[r];
         k->noise[kept] = k->noise[r];

@@ -121,7 +121,8 @@ static int support(double z, double l, double u, double entries, double *sum, do
 }
 
 int kinqp_qp_crossed(double l, double u, double entries) {
-    return l - u > 2.0 * fmax(KINQP_QP_RELATIVE * fmax(fabs(l), fabs(u)), KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0));
+    const double noise = KINQP_QP_NOISE * (entries > 0.0 ? entries : 1.0);
+    return l - u > 2.0 * fmax(KINQP_QP_RELATIVE * fmax(fabs(l), fabs(u)), noise);
 }
 
 int kinqp_qp_proves_infeasible(const kinqp_qp *qp, const kinqp_qp_solution *s) {
@@ -134,7 +135,8 @@ int kinqp_qp_proves_infeasible(const kinqp_qp *qp, const kinqp_qp_solution *s) {
     for (int i = 0; i < qp->p; ++i)
         if (!support(s->y[i], qp->b[i], qp->b[i], kinqp_qp_entries(qp->A + i * n, n), &sum, &noise)) return 0;
     for (int i = 0; i < qp->m; ++i)
-        if (!support(s->z[i], lower(qp->l, i), upper(qp->u, i), kinqp_qp_entries(qp->C + i * n, n), &sum, &noise)) return 0;
+        if (!support(s->z[i], lower(qp->l, i), upper(qp->u, i), kinqp_qp_entries(qp->C + i * n, n), &sum, &noise))
+            return 0;
     for (int i = 0; i < n; ++i)
         if (!support(s->z_box[i], lower(qp->lb, i), upper(qp->ub, i), 1.0, &sum, &noise)) return 0;
     for (int j = 0; j < n; ++j) {

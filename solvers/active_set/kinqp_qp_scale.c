@@ -85,6 +85,7 @@ static double scale_row(const kinqp_qp_work *k, const double *row, double *out) 
  * likewise at most m + n other rows. */
 static double *new_equality(kinqp_qp_work *k, int id, double value, double factor, double noise) {
     const int i = k->equalities++;
+    KINQP_ASSERT(i < k->limit);
     k->enoise[i] = KINQP_QP_NOISE * factor * noise;
     k->eid[i] = id;
     k->e[i] = value;
@@ -94,6 +95,7 @@ static double *new_equality(kinqp_qp_work *k, int id, double value, double facto
 
 static void new_row(kinqp_qp_work *k, int id, double low, double high, double noise) {
     const int i = k->rows++;
+    KINQP_ASSERT(i < k->limit);
     k->noise[i] = KINQP_QP_NOISE * noise;
     k->sign[i] = 0;
     k->id[i] = id;

@@ -124,16 +124,16 @@ class ActiveSet(Solver):
         np.copyto(self._lower, qp.lower)
         np.copyto(self._upper, qp.upper)
 
-    def _solve(self, qp: QP) -> RawSolution:
+    def _solve(self, qp: QP) -> RawSolution:  # noqa: ARG002  # the interface has it; its data are in the buffers
         answer = self._answer
         claimed = STATUSES[self._call(self._problem, self._options, self._memory, answer)]
         if claimed is Status.SOLVED:
             return RawSolution(
                 claimed=claimed, x=self._x, y=self._y, z=self._z, z_box=self._z_box, iterations=answer.iterations
             )
-        return self._unsolved(qp, claimed)
+        return self._unsolved(claimed)
 
-    def _unsolved(self, qp: QP, claimed: Status) -> RawSolution:
+    def _unsolved(self, claimed: Status) -> RawSolution:
         answer = self._answer
         if claimed is Status.FAILED:
             return RawSolution(
@@ -155,8 +155,8 @@ class ActiveSet(Solver):
             message = f"No convergence within {self._options.max_iterations} iterations."
         elif not (answer.primal < np.inf):
             message = (
-                "The rows seem to contradict each other, but by so little beside the rounding in them that it could not be "
-                "proved; no point was found that satisfies them either."
+                "The rows seem to contradict each other, but by so little beside the rounding in them that it could "
+                "not be proved; no point was found that satisfies them either."
             )
         else:
             message = (

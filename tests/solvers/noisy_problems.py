@@ -1,4 +1,4 @@
-"""Small random QPs near zero: dependent rows with noise in their bounds, rows of zeros, optima of cost zero, odd units."""
+"""Small random QPs near zero: dependent rows with noise in their bounds, rows of zeros, optima of cost zero."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ def draw(rng: np.random.Generator) -> NoisyProblem:
 def contradiction(qp: QP) -> float:
     """Return by how much rows contradict each other, by HiGHS.
 
-    The least t for which some x is out of no row by more than t times the row's absolute entries (of a row of zeros: t).
+    The least t for which some x is out of no row by more than t times the row's absolute entries; t if it has none.
     """
     size = np.abs(qp.stacked).sum(axis=1)
     size[size == 0] = 1

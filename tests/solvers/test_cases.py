@@ -1,9 +1,9 @@
 """Problems on which earlier versions were wrong: noise where zero is meant, unlike units, minimisers far away.
 
-``cases/near_zero.npz`` holds their data, ``cases/near_zero.json`` what is right. ``LIPMWALK*`` and ``QUADCMPC3`` are from
-qpbenchmark's set for model predictive control, ``Q*`` from Maros and Meszaros (``_rowscale``: rows multiplied by powers of
-ten); the others are random ones, shrunk. Clarabel and HiGHS agree on the objectives; where there is no solution, neither
-of Clarabel, DAQP, HiGHS and PIQP finds a point.
+``cases/near_zero.npz`` holds their data, ``cases/near_zero.json`` what is right. ``LIPMWALK*`` and ``QUADCMPC3`` are
+from qpbenchmark's set for model predictive control, ``Q*`` from Maros and Meszaros (``_rowscale``: rows multiplied by
+powers of ten); the others are random ones, shrunk. Clarabel and HiGHS agree on the objectives; where there is no
+solution, none of Clarabel, DAQP, HiGHS and PIQP finds a point.
 """
 
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinqp.solvers import QP, Status, get_solver
+from kinqp.solvers import QP, get_solver
 
 FOLDER = Path(__file__).with_name("cases")
 RIGHT = json.loads((FOLDER / "near_zero.json").read_text(encoding="utf-8"))

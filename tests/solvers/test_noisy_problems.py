@@ -84,7 +84,7 @@ def test_more_noisy_problems(seed: int) -> None:
 
 @pytest.mark.parametrize("noise", [0.0, 1e-17, 1e-13, 1e-9, -1e-9])
 def test_noise_where_zero_is_meant(noise: float) -> None:
-    """Two rows that are one, as those of an arm in a singular pose; what rounding has left of zero contradicts itself."""
+    """Two rows that are one, as those of an arm in a singular pose; what rounding left of zero contradicts itself."""
     solver = get_solver("active-set")
     assert solver.solve(QP(H=np.eye(3), g=[0, 0, 0], A=[[1, 2, -1], [2, 4, -2]], b=[0, noise])).solved
     solution = solver.solve(QP(H=np.eye(3), g=[-1, -1, 2], C=[[1, 2, -1], [-1, -2, 1]], u=[0, noise]))

@@ -259,6 +259,6 @@ def test_what_is_no_qp_is_refused_in_one_sentence() -> None:
 
 @pytest.mark.parametrize("status", [Status.PRIMAL_INFEASIBLE, Status.DUAL_INFEASIBLE, Status.FAILED])
 def test_a_claim_without_words_gets_some(status: Status) -> None:
-    message = Scripted(lambda qp: RawSolution(claimed=status)).solve(BOX).message
+    message = Scripted(lambda _: RawSolution(claimed=status)).solve(BOX).message
     assert status.value in message
     assert ("offers no proof" in message) == (status is not Status.FAILED)
