@@ -175,6 +175,7 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
     int met = 0;     /* passes that met the tolerance, but without margin */
     int refined = 0; /* 1: the iterate is the refined point of the last pass */
     int relaxed = 0;  /* 1: the bounds are moved out by their noise */
+    int strict = 0;   /* 1: rows go by their own terms, since the longest x let the last pass stop too early */
     int disputed = 0; /* 1: the last pass found the rows contradictory, which could not be proved */
     core.warm = o->warm;
     for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
@@ -187,7 +188,7 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
             /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
             core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
         }
-        if (refined || disputed) set_tolerances(k, m, aim, relaxed);
+        if (refined || strict) set_tolerances(k, m, aim, relaxed);
         core.max_iterations = o->max_iterations - s->iterations;
         const kinqp_status status = kinqp_as_solve(&k->state, k->whiterows, k->lo, k->hi, k->centre, NULL, &core, k->w,
                                                    k->rowz, k->sign, &result);
@@ -201,7 +202,7 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
                 s->primal = HUGE_VAL; /* neither a point nor a proof */
                 return KINQP_INACCURATE;
             }
-            disputed = 1;
+            disputed = strict = 1;
             core.warm = 0;
             refined = 0;
             continue;
@@ -225,6 +226,7 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
         kinqp_qp_measure(qp, k->scale, KINQP_QP_UNITS, s);
         if (s->passes > 1 && s->primal <= o->tolerance && fmax(s->dual, s->gap) <= share * o->tolerance)
             return KINQP_SOLVED;
+        strict |= s->primal > o->tolerance;
         const int nearly = worst_residual(s) <= KINQP_NEARLY;
         if (s->passes >= KINQP_PASSES_UNTIL_RELAXED && !relaxed && s->primal > o->tolerance && nearly) {
             for (int i = 0; i < n; ++i) k->x[i] = k->trial[i];
