@@ -113,3 +113,12 @@ def test_dual_infeasibility_certificates() -> None:
         assert not is_dual_infeasibility_certificate(qp, wrong)
     closed = QP(H=np.diag([1, 0]), g=[0, -1], ub=[INF, 9])
     assert not is_dual_infeasibility_certificate(closed, vec(0, 1))
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_a_ray_is_one_in_any_units(unit: float) -> None:
+    """Two variables grow together without end, one of them in another unit."""
+    qp = QP(H=np.zeros((2, 2)), g=[-1, 0], A=[[1, -unit]], b=[0], lb=[0, 0])
+    assert is_dual_infeasibility_certificate(qp, vec(1, 1 / unit))
+    assert not is_dual_infeasibility_certificate(qp, vec(-1, -1 / unit))
+    assert not is_dual_infeasibility_certificate(qp, vec(1, 2 / unit))
