@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import difflib
 import math
-from numbers import Integral, Real
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -21,7 +22,11 @@ class UnknownOptionError(TypeError):
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float if it is a finite positive number, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not (0.0 < value < math.inf):
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float | np.integer | np.floating)
+        or not (0.0 < value < math.inf)
+    ):
         raise OptionError(f"{name} must be a positive number, but is {value!r}.")
     return float(value)
 
@@ -37,7 +42,7 @@ def gap_tolerance(tolerance: float) -> float:
 
 def count(name: str, value: int) -> int:
     """Return `value` as an int if it is an integer, of Python or NumPy, of at least 1, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise OptionError(f"{name} must be an integer of at least 1, but is {value!r}.")
     return int(value)
 

@@ -252,5 +252,6 @@ kinqp_status kinqp_qp_passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_q
             kinqp_qp_whiten(k, m);
         }
     }
+    s->passes = o->max_passes;
     return KINQP_INACCURATE;
 }

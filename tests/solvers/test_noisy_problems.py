@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinqp.solvers import QP, Solution, Status, get_solver
+from kinqp.solvers.catalogue import CATALOGUE, KnownQP
 from tests.solvers.noisy_problems import contradiction, draw
 from tests.solvers.referee import cost_size
 
@@ -101,3 +102,29 @@ def test_what_contradicts_itself_by_more_is_infeasible(size: float) -> None:
         solution = solver.solve(qp)
         assert solution.status is Status.PRIMAL_INFEASIBLE
         assert solution.told_the_truth
+
+
+@pytest.mark.parametrize("known", [known for known in CATALOGUE if known.x is not None], ids=lambda known: known.name)
+def test_rows_given_again_with_noise_leave_the_answer(known: KnownQP) -> None:
+    """Each row once more, doubled, its bounds off by noise; and a row of zeros."""
+    rng = np.random.default_rng(4)
+    solver, qp = get_solver("active-set"), known.qp
+    for noise in (1e-17, 1e-15, 1e-12, 1e-9):
+        for _ in range(5):
+            off = [2 * noise * np.abs(rows).sum(axis=1) * rng.uniform(-1, 1, len(rows)) for rows in (qp.A, qp.C)]
+            again = QP.trusted(
+                H=qp.H,
+                g=qp.g,
+                A=np.vstack((qp.A, 2 * qp.A, np.zeros((1, qp.n)))),
+                b=np.concatenate((qp.b, 2 * qp.b + off[0], [noise])),
+                C=np.vstack((qp.C, 2 * qp.C, np.zeros((1, qp.n)))),
+                l=np.concatenate((qp.l, 2 * qp.l + off[1], [-1])),
+                u=np.concatenate((qp.u, 2 * qp.u + off[1], [-noise])),
+                lb=qp.lb,
+                ub=qp.ub,
+            )
+            solution = solver.solve(again)
+            assert solution.solved, solution.message
+            assert qp.objective(solution.x) == pytest.approx(qp.objective(known.x), rel=1e-7, abs=1e-6)
+            if known.x_unique:
+                np.testing.assert_allclose(solution.x, known.x, rtol=1e-5, atol=1e-5)
