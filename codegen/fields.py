@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from ..formulations import Input, Mode, Tick
 
+_LONGEST_NAME: Final = 80
 # New at every tick; all other run-time inputs are parameters.
 SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 # Parameters, with a default, that are new at every tick all the same: a batch takes a row of them for each.
@@ -116,8 +117,14 @@ class ModeText(ABC):
 
 
 def identifier(text: str) -> str:
-    """Turn a name into a C identifier."""
-    return re.sub(r"\W+", "_", text.replace("-", "_")).strip("_").lower()
+    """Turn a name into a C identifier; what is no letter or digit of ASCII becomes an underscore."""
+    return re.sub(r"\W+", "_", text.replace("-", "_"), flags=re.ASCII).strip("_").lower()
+
+
+def prefix_of(robot: str, formulation: str) -> str:
+    """Return what the files and symbols of a formulation on a robot are called by, whatever the two are called."""
+    # A file's name must leave room for what is put behind.
+    return identifier(f"kinqp_{robot[:_LONGEST_NAME]}_{formulation[:_LONGEST_NAME]}")
 
 
 def field_of(given: Input) -> Field:

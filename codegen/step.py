@@ -11,7 +11,7 @@ from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
 from . import qrqp
-from .fields import MEMORY, identifier
+from .fields import MEMORY, prefix_of
 from .model import step_code
 from .render import render_batch, render_step
 from .results import BatchResult, TickResult
@@ -79,7 +79,7 @@ class CompiledStep:
         self.robot: Final = robot
         self.formulation: Final = formulation
         self.mode: Final = mode
-        prefix = identifier(f"kinqp_{robot.name}_{formulation.name}")
+        prefix = prefix_of(robot.name, formulation.name)
         code = step_code(robot, formulation, [mode], prefix)
         self.code: Final[StepCode] = code
         files = render_step(code) if solver == SOLVER else qrqp.render_qrqp(code, formulation, robot, mode)
