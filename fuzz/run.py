@@ -79,9 +79,9 @@ def compiled(folder: Path, *, guiding: bool = True) -> list[str]:
     (export_guiding if guiding else export_c)(load_robot(robot), formulation, list(modes), code, name="fuzzed")
     sources = ["fuzzed.c", "fuzzed_guiding.c"] if guiding else ["fuzzed.c"]
     header = "fuzzed_guiding.h" if guiding else "fuzzed.h"
+    names = (f'-DHEADER="{header}"', "-DPREFIX=fuzzed", f"-DGUIDING={int(guiding)}")
     line = [
-        os.environ.get("CLANG", "clang"), *FLAGS, SANITIZERS, f'-DHEADER="{header}"', "-DPREFIX=fuzzed", f"-DGUIDING={int(guiding)}",
-        "-I.", str(HERE / "step.c"), *sources, "-lm", "-o", "target",
+        os.environ.get("CLANG", "clang"), *FLAGS, SANITIZERS, *names, "-I.", str(HERE / "step.c"), *sources, "-lm", "-o", "target",
     ]  # fmt: skip
     subprocess.run(line, cwd=code, check=True)
     return [str(code / "target"), "-max_len=4096"]

@@ -65,8 +65,9 @@ def nearly_a_urdf(data: atheris.FuzzedDataProvider) -> str:
         )
         parent = links[data.ConsumeIntInRange(0, count)] if odd() else links[i]
         axis = ("1 0 0", "0 1 0", "0 0 1", "1 1 1", "0 -1 0")[data.ConsumeIntInRange(0, 4)]
+        name = pick(f"j{i}", NAMES)
         parts.append(
-            f'<joint name="{pick(f"j{i}", NAMES)}" type="{kind}"><parent link="{parent}"/><child link="{links[i + 1]}"/>'
+            f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{links[i + 1]}"/>'
             f'<origin xyz="{three("0 0 0.3")}" rpy="{three("0 0 0")}"/><axis xyz="{three(axis)}"/>'
             f"{'' if odd() else limit}{pick('', EXTRA)}</joint>"
         )

@@ -18,6 +18,8 @@ _SUPPORTED = (*_LIMITED, "continuous", "fixed")
 #: More than any machine has that is described in one file, humanoids with both hands included; what pinocchio needs
 #: grows with the square of it, in memory and in time.
 _MOST_LINKS = 1000
+#: Of a joint's origin [m or rad]; beyond, rounding of a position would be visible.
+_FARTHEST = 1e6
 #: More joints than any arm has. A snake robot has thirty.
 _MOST_JOINTS = 100
 #: URDF wants axes of length 1. Files hold rounded ones, and (0 0 2); far from 1 it is a slip, and what is left of a
@@ -274,8 +276,12 @@ def _check_origin(label: str, origin: dict[str, str] | None) -> None:
             raise RobotError(
                 f"{label}: expected xyz and rpy in its <origin>, got {what!r}; correct the attribute's name"
             )
-        if len(_numbers_in(text)) != 3:
-            raise RobotError(f"{label}: expected {what} of its <origin> as three finite numbers, got {text!r}")
+        numbers = _numbers_in(text)
+        if len(numbers) != 3 or max(map(abs, numbers)) > _FARTHEST:
+            raise RobotError(
+                f"{label}: expected {what} of its <origin> as three finite numbers of at most {_FARTHEST:g}, "
+                f"got {text!r}"
+            )
 
 
 def _check_axis(label: str, given: dict[str, str] | None) -> None:

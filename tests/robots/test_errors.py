@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -112,7 +113,7 @@ def test_unreadable_file(tmp_path: Path) -> None:
         (_robot(_FIRST, _joint("cb", "c", "b")), r"expected one joint to carry link 'b', got 'ab' and 'cb'$"),
         (
             _robot(_FIRST, links="ab").replace('xyz="0 0 0.1"', 'xyz="one two"'),
-            r"joint 'ab': expected xyz of its <origin> as three finite numbers, got 'one two'$",
+            r"joint 'ab': expected xyz of its <origin> as three finite numbers of at most 1e\+06, got 'one two'$",
         ),
     ],
 )
@@ -290,8 +291,12 @@ def test_missing_or_useless_limit(tmp_path: Path, kind: str, inside: str, messag
     [
         ('<origin xzy="0 0 1"/>', r"expected xyz and rpy in its <origin>, got 'xzy'; "),
         ('<origin xyz="0 0 1" rqy="0 0 0"/>', r"expected xyz and rpy in its <origin>, got 'rqy'; "),
-        ('<origin xyz="0 0"/>', r"expected xyz of its <origin> as three finite numbers, got '0 0'$"),
-        ('<origin rpy="0 0 inf"/>', r"expected rpy of its <origin> as three finite numbers, got '0 0 inf'$"),
+        ('<origin xyz="0 0"/>', r"expected xyz of its <origin> as three finite numbers of at most 1e\+06, got '0 0'$"),
+        ('<origin xyz="0 0 1e7"/>', r"of at most 1e\+06, got '0 0 1e7'$"),
+        (
+            '<origin rpy="0 0 inf"/>',
+            r"expected rpy of its <origin> as three finite numbers of at most 1e\+06, got '0 0 inf'$",
+        ),
     ],
 )
 def test_an_origin_that_would_be_taken_for_none(tmp_path: Path, kind: str, origin: str, message: str) -> None:
@@ -314,6 +319,17 @@ def test_an_axis_of_another_length_counts_as_its_direction(tmp_path: Path, axis:
     symbolic = ca.Function("pose", [symbol], [given.symbolic(symbol).pose])
     np.testing.assert_allclose(given.pose(q), unit.pose(q), rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(symbolic(q).full(), unit.pose(q), rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "inertial", ['<mass value="1e999"/>', '<mass value="nan"/>', '<origin xyz="0 0 1e300"/><mass value="1"/>']
+)
+def test_masses_that_are_no_numbers(tmp_path: Path, inertial: str) -> None:
+    text = _robot(_FIRST, links="ab").replace('<mass value="1"/>', inertial)
+    try:
+        assert not _load(tmp_path, text).has_inertia
+    except RobotError as error:
+        assert re.match(r"joint 'ab': expected finite numbers for mass and inertia|.*pinocchio rejects", str(error))  # noqa: PT017
 
 
 def _long(joints: int, kind: str) -> str:
