@@ -81,7 +81,8 @@ def compiled(folder: Path, *, guiding: bool = True) -> list[str]:
     header = "fuzzed_guiding.h" if guiding else "fuzzed.h"
     names = (f'-DHEADER="{header}"', "-DPREFIX=fuzzed", f"-DGUIDING={int(guiding)}")
     line = [
-        os.environ.get("CLANG", "clang"), *FLAGS, SANITIZERS, *names, "-I.", str(HERE / "step.c"), *sources, "-lm", "-o", "target",
+        os.environ.get("CLANG", "clang"), *FLAGS, SANITIZERS, *names, "-I.",
+        str(HERE / "step.c"), *sources, "-lm", "-o", "target",
     ]  # fmt: skip
     subprocess.run(line, cwd=code, check=True)
     return [str(code / "target"), "-max_len=4096"]

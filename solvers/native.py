@@ -220,9 +220,10 @@ def _require_own(folder: Path) -> None:
     """
     real = folder.resolve()
     if not _trusted(real.stat):
+        found = real.stat()
         raise CompilerError(
             f"the cache of C libraries, {folder}: expected a folder of this user that no one else may write to, got "
-            f"one of user {real.stat().st_uid} with mode {stat.S_IMODE(real.stat().st_mode):o}, whose libraries would run "
+            f"one of user {found.st_uid} with mode {stat.S_IMODE(found.st_mode):o}, whose libraries would run "
             f"here; chmod go-w it if it is yours, or set KINQP_CACHE to another"
         )
     for above in real.parents:
