@@ -9,7 +9,7 @@ PARALLEL := -n auto --dist loadfile -p no:benchmark
 FOLDERS := robots solvers formulations codegen baselines control benchmarks cli configs testing
 SOURCES := pyproject.toml README.md py.typed $(shell find $(FOLDERS) -type f -not -path '*/__pycache__/*')
 
-.PHONY: help bench perf test test-long test-arm browser lint format types clean
+.PHONY: help bench perf test test-long test-arm fuzz browser lint format types clean
 
 help:
 	@echo "make bench      the semicircle: formulations x solvers, one table (results in $(OUT)/)"
@@ -17,6 +17,7 @@ help:
 	@echo "make test       the tests, under 5 minutes"
 	@echo "make test-long  the same tests with more states"
 	@echo "make test-arm   generated code and solver on 64- and 32-bit ARM, emulated (Debian packages: see the target)"
+	@echo "make fuzz       libFuzzer on URDF files and on generated C, FUZZ_SECONDS=600 each (wants clang)"
 	@echo "make browser    Chromium and its driver (Debian packages), where they are missing: tests of the report's page use them"
 	@echo "make lint       ruff"
 	@echo "make types      mypy --strict on the installed library"
@@ -40,6 +41,15 @@ test-long: $(VENV)/.installed
 # apt-get install gcc-aarch64-linux-gnu gcc-arm-linux-gnueabihf libc6-dev-arm64-cross libc6-dev-armhf-cross qemu-user
 test-arm: $(VENV)/.installed
 	$(BIN)/python -m pytest tests/codegen/test_arm.py
+
+# Hostile files, and any bits in generated C under sanitizers; FUZZ="urdf step guiding" chooses. What is found stays in
+# $(OUT)/fuzz. clang brings libFuzzer for C (Debian: apt-get install clang libclang-rt-14-dev), the wheel atheris for Python.
+FUZZ_SECONDS ?= 600
+FUZZ ?= urdf step guiding
+fuzz: $(VENV)/.installed $(VENV)/.fuzz
+	@command -v $${CLANG:-clang} >/dev/null || \
+	  { echo "make fuzz needs clang with libFuzzer: apt-get install clang libclang-rt-14-dev"; exit 1; }
+	$(BIN)/python fuzz/run.py $(FUZZ) --seconds $(FUZZ_SECONDS) --out $(OUT)/fuzz
 
 # Without a browser the tests of the report's page are skipped, and say so.
 browser:
@@ -76,6 +86,10 @@ $(VENV)/.installed: $(VENV)/.dependencies $(SOURCES)
 
 $(VENV)/.perf: $(VENV)/.dependencies | $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt "$$(echo dist/*.whl)[perf]"
+	@touch $@
+
+$(VENV)/.fuzz: $(VENV)/.dependencies | $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt "$$(echo dist/*.whl)[fuzz]"
 	@touch $@
 
 clean:

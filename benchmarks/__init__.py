@@ -7,9 +7,11 @@ from .conditions import conditions
 from .config import Product, SweepConfig, cells_of
 from .errors import CompareError, ReportError
 from .loading import ConfigError, load_config, make_config
+from .manifest import Manifest
 from .metrics import ON_LIMIT, REQUIREMENTS, cell_record, geometric_means, performance_profile, records, scorecard
+from .reading import StoreError
 from .scenarios import Phase, Scenario, ScenarioError, States, available_scenarios, get_scenario
-from .store import Manifest, Outcome, Part, Store, StoreError
+from .store import Outcome, Part, Store
 from .summary import CellSummary, Spread, cell_summary
 from .sweep import sweep
 from .table import TABLE_WIDTH, sweep_table

@@ -6,8 +6,10 @@ import atexit
 import socket
 import sys
 import threading
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
+from time import sleep
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 # How long to wait for the scheduler, and for its first worker [s].
 _PATIENCE: Final = 30.0
+# How often to look for results [s].
+_POLL: Final = 0.02
 _LOCAL: Final = threading.local()
 
 
@@ -45,7 +49,7 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
     Raises
     ------
     ClusterError
-        When distributed is not installed, or there is no scheduler or no worker there.
+        When distributed is not installed, there is no scheduler or no worker there, or the scheduler is lost.
     """
     if find_spec("distributed") is None:
         raise ClusterError("--scheduler: expected Dask to be installed, got nothing: pip install 'kinqp[cluster]'")
@@ -70,11 +74,25 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
             ): task
             for task in tasks
         }  # fmt: skip
+        waiting = distributed.as_completed(futures)
         try:
-            for future in distributed.as_completed(futures):
+            while futures:
+                # Not `next`, which waits for ever once the scheduler is gone.
+                while not waiting.has_ready():
+                    if client.status != "running":
+                        raise ConnectionError(f"the connection is {client.status}")
+                    sleep(_POLL)
+                future = next(waiting)
                 yield _result(future, futures.pop(future))
+        except (distributed.CancelledError, distributed.TimeoutError, OSError) as error:
+            # With its scheduler a client loses all that it has asked for.
+            raise ClusterError(
+                f"--scheduler: expected the Dask scheduler at {scheduler} until all is done, and it is gone ({error}); "
+                "what came back is kept: start one and continue with --resume"
+            ) from error
         finally:
-            client.cancel(list(futures))
+            with suppress(Exception):  # a scheduler that is gone has nothing to cancel
+                client.cancel(list(futures))
 
 
 def _check_reachable(scheduler: str) -> None:
@@ -93,7 +111,7 @@ def _check_reachable(scheduler: str) -> None:
 
 
 def _result(future: Any, task: Task) -> Ran | Recorded:
-    error = future.exception()
+    error = future.exception(timeout=_PATIENCE)
     if error is None:
         found: Ran | Recorded = future.result()
         return found

@@ -38,7 +38,7 @@ def load_config(path: Path | None = None) -> SweepConfig:
     try:
         text = _shipped(path) or path.read_text(encoding="utf-8")
         given = tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise ConfigError(f"{path}: expected a readable TOML file: {error}") from error
     return make_config(given, str(path), text)
 

@@ -6,27 +6,24 @@ import io
 import json
 import os
 import tempfile
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-import polars as pl
-
-from .cells import Cell
 from .config import SweepConfig, cells_of, skipped_of
+from .manifest import FORMAT, Manifest, read_manifest, tuples
+from .reading import StoreError, broken, is_archive, is_parquet, read_frame, read_object
 
 if TYPE_CHECKING:
-    from .cells import Block
+    import polars as pl
 
-_FORMAT: Final = 2
+    from .cells import Block, Cell
+
 _FOLDERS: Final = ("ticks", "times", "cells", "problems", "records")
 # Between a sweep and its continuation these may differ.
 _MAY_CHANGE: Final = frozenset({"date"})
-
-
-class StoreError(RuntimeError):
-    """A results folder can't be used as asked; the message says what to do."""
+_AGAIN: Final = "delete it and continue the sweep with --resume, which runs that cell again"
 
 
 @dataclass(frozen=True)
@@ -70,27 +67,6 @@ class Outcome:
         return next((part.reason for part in (self.accuracy, self.timing) if part and part.state == "failed"), "")
 
 
-@dataclass(frozen=True)
-class Manifest:
-    """What was asked for, and under which conditions it was measured.
-
-    Attributes
-    ----------
-    config : SweepConfig
-    conditions : dict of str to str
-        Machine, versions, git revision, date.
-    cells : tuple of Cell
-        All that the sweep consists of, done or not.
-    skipped : dict of str to str
-        What the configuration names and is not a cell, and why.
-    """
-
-    config: SweepConfig
-    conditions: dict[str, str]
-    cells: tuple[Cell, ...]
-    skipped: dict[str, str] = field(default_factory=dict)
-
-
 class Store:
     """A results folder.
 
@@ -116,7 +92,7 @@ class Store:
         ------
         StoreError
             When it holds a sweep and neither `resume` nor `overwrite` is asked for, or `resume` is and the sweep there
-            has another configuration or was measured elsewhere.
+            has another configuration or was measured elsewhere, or one of its files is broken.
         """
         if resume and overwrite:
             raise StoreError(f"{self.folder}: expected either --resume or --overwrite, got both")
@@ -130,7 +106,7 @@ class Store:
                 for old in (self.folder / name).iterdir():
                     old.unlink()
             content = {
-                "format": _FORMAT,
+                "format": FORMAT,
                 "config": config.model_dump(mode="json"),
                 "conditions": conditions,
                 "cells": [asdict(cell) for cell in cells_of(config)],
@@ -157,6 +133,12 @@ class Store:
                     f"{self.folder} was measured with {key} {value!r} and this is {conditions.get(key)!r}: "
                     "times of the two don't belong into one table; give another folder with --out"
                 )
+        # Now rather than after hours, when the table is made.
+        for cell in self.manifest.cells:
+            self.outcome(cell)
+            for path in (self._file("ticks", cell), self._file("times", cell)):
+                if path.exists() and not is_parquet(path):
+                    read_frame(path, _AGAIN)
 
     @cached_property
     def manifest(self) -> Manifest:
@@ -168,15 +150,9 @@ class Store:
             When there is none, or it can't be read.
         """
         try:
-            read: dict[str, Any] = json.loads(self._path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            return read_manifest(self._path)
+        except OSError as error:
             raise StoreError(f"{self.folder}: expected a sweep's manifest.json there: {error}") from error
-        if read.get("format") != _FORMAT:
-            raise StoreError(f"{self._path}: expected format {_FORMAT}, got {read.get('format')!r}")
-        # Checked when it was written. Here it need not name what is installed: results are read elsewhere, too.
-        config = SweepConfig.model_construct(**_tuples(read["config"]))
-        cells = tuple(Cell(**cell) for cell in read["cells"])
-        return Manifest(config, dict(read["conditions"]), cells, dict(read["skipped"]))
 
     def cells(self) -> tuple[Cell, ...]:
         """Cells whose ticks are there, in the manifest's order."""
@@ -188,22 +164,37 @@ class Store:
         return {cell: reason for cell, reason in reasons.items() if reason}
 
     def outcome(self, cell: Cell) -> Outcome:
-        """How a cell ended, as far as it has been run."""
+        """How a cell ended, as far as it has been run; a part whose ticks or times are gone has not been.
+
+        Raises
+        ------
+        StoreError
+            When the file that says so is broken.
+        """
+        path = self.folder / "cells" / f"{cell.file_stem}.json"
         try:
-            read = json.loads((self.folder / "cells" / f"{cell.file_stem}.json").read_text(encoding="utf-8"))
+            read = read_object(path, _AGAIN)
+            parts = {name: _part(part) for name, part in read.items()}
+            outcome = Outcome(**parts)
         except FileNotFoundError:
             return Outcome()
-        parts = {name: None if part is None else Part(**_tuples(part)) for name, part in read.items()}
-        return Outcome(**parts)
+        except (TypeError, ValueError, AttributeError) as error:
+            raise broken(path, "the end of a cell", str(error), _AGAIN) from error
+        return Outcome(
+            *(
+                None if part and part.state == "done" and not self._file(folder, cell).exists() else part
+                for folder, part in (("ticks", outcome.accuracy), ("times", outcome.timing))
+            )
+        )
 
     def ticks(self, cell: Cell) -> pl.DataFrame:
         """Ticks of a cell's accuracy part, one per row; the columns are those of `kinqp.benchmarks.accuracy`."""
-        return pl.read_parquet(self._file("ticks", cell))
+        return read_frame(self._file("ticks", cell), _AGAIN)
 
     def times(self, cell: Cell) -> pl.DataFrame | None:
         """Times of a cell, one tick of one repeat per row, as `kinqp.benchmarks.replay` has them; None: not timed."""
         path = self._file("times", cell)
-        return pl.read_parquet(path) if path.exists() else None
+        return read_frame(path, _AGAIN) if path.exists() else None
 
     def content(self, cell: Cell) -> bytes:
         """Bytes of a cell's files: the same frames where they are the same."""
@@ -233,6 +224,10 @@ class Store:
     def problems(self, block: Block) -> Path:
         """Where a block's recorded problems are kept."""
         return self.folder / "problems" / f"{block.file_stem}.npz"
+
+    def has_problems(self, block: Block) -> bool:
+        """Whether a block's problems are recorded; what was cut off is none, and is recorded again."""
+        return is_archive(self.problems(block))
 
     def begun(self, block: Block) -> Path:
         """Where what a block's timing has come to is kept until it is done."""
@@ -268,11 +263,8 @@ def write_whole(path: Path, content: bytes) -> None:
         raise
 
 
-def _tuples(read: dict[str, Any]) -> dict[str, Any]:
-    """Turn JSON's lists back into tuples, and further products into what they were."""
-    from .config import Product
-
-    made: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in read.items()}
-    if "more" in made:
-        made["more"] = tuple(Product.model_construct(**_tuples(product)) for product in made["more"])
-    return made
+def _part(read: dict[str, Any] | None) -> Part | None:
+    part = None if read is None else Part(**tuples(read))
+    if part is not None and part.state not in ("done", "failed"):
+        raise ValueError(f"expected the state done or failed, got {part.state!r}")
+    return part

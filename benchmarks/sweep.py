@@ -11,6 +11,7 @@ from .cluster import on_a_cluster
 from .conditions import conditions, timing_core
 from .config import SweepConfig
 from .loading import make_config
+from .lock import sole_writer
 from .messages import Begun, Ran
 from .processes import Worker
 from .schedule import Recorded, Task, on_this_machine
@@ -70,7 +71,7 @@ def sweep(
     ConfigError
         Naming the key of `config` that is not usable.
     StoreError
-        When `out` can't be used as asked.
+        When `out` can't be used as asked, another sweep is running in it, or a file there is broken.
     ClusterError
         When the scheduler can't be used.
     """
@@ -79,8 +80,9 @@ def sweep(
     if not isinstance(config, SweepConfig):
         config = make_config(dict(config or {}))
     store = Store(out)
-    store.begin(config, conditions(), resume=resume, overwrite=overwrite)
-    return _Sweep(store, config, on_progress).run(workers or _cores(), scheduler)
+    with sole_writer(store.folder):
+        store.begin(config, conditions(), resume=resume, overwrite=overwrite)
+        return _Sweep(store, config, on_progress).run(workers or _cores(), scheduler)
 
 
 class _Sweep:
@@ -115,7 +117,7 @@ class _Sweep:
         tasks: list[Task] = []
         for block, cells in blocks.items():
             untimed = any(self._outcomes[cell].timing is None for cell in cells)
-            if untimed and not self._store.problems(block).exists():
+            if untimed and not self._store.has_problems(block):
                 tasks.append(Task(block))
             tasks += [Task(block, cell) for cell in cells if self._outcomes[cell].accuracy is None]
         return tasks
@@ -147,7 +149,7 @@ class _Sweep:
         try:
             for block, cells in blocks.items():
                 path = self._store.problems(block)
-                if not path.exists():
+                if not self._store.has_problems(block):
                     for cell in cells:
                         self._end(Ran(cell, None, Part("failed", "the block has no recorded problems")))
                     continue

@@ -33,6 +33,7 @@ from ..codegen import CurvatureError, ExportError, export_c
 from ..control import export_guiding
 from ..formulations import MODE_NAMES, DeclarationError, ModeError, PlotError, available_formulations, get_formulation
 from ..robots import RobotError, available_robots, load_robot
+from ..robots.text import one_line
 from ..solvers import OptionError, UnknownOptionError, available_solvers
 from ..solvers.native import CompilerError
 from ..solvers.plugins import PluginError
@@ -125,12 +126,12 @@ def run_sweep(
     console = _console()
     store = Store(out)
     progress = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(markup=False, stderr=True),
         transient=True,
     )
     loaded = load_config(config)
@@ -195,7 +196,9 @@ def run_describe(
     typer.echo(made.describe(arm, mode), nl=False)
     if spy is not None:
         written = made.spy(arm, mode, spy)
-        Console(stderr=True, soft_wrap=True).print(f"Wrote {written}. Next: kinqp export, to have it as C.")
+        Console(markup=False, stderr=True, soft_wrap=True).print(
+            f"Wrote {written}. Next: kinqp export, to have it as C."
+        )
 
 
 def _described(name: str, get: Callable[[str], object] = get_formulation) -> str:
@@ -208,7 +211,7 @@ def _described(name: str, get: Callable[[str], object] = get_formulation) -> str
 
 def _console() -> Console:
     # A narrower terminal, or none, would cut figures off; wrapped lines can still be read.
-    return Console(width=max(TABLE_WIDTH, Console().width))
+    return Console(markup=False, width=max(TABLE_WIDTH, Console().width))
 
 
 def main() -> None:
@@ -218,5 +221,7 @@ def main() -> None:
     try:
         app()
     except USER_ERRORS as error:
-        Console(stderr=True, soft_wrap=True).print(f"kinqp: {error}", style="red", highlight=False, markup=False)
+        # A file's words are in it; a terminal would take some for commands.
+        words = "\n".join(one_line(line) for line in str(error).splitlines())
+        Console(markup=False, stderr=True, soft_wrap=True).print(f"kinqp: {words}", style="red", highlight=False)
         sys.exit(2)

@@ -64,7 +64,7 @@ def run_certify(
 ) -> None:
     """Prove how many iterations the active set takes at most, at given states, for every hand."""
     # A narrower terminal, or none, would break columns; wrapped lines can still be read.
-    console = Console(soft_wrap=True, width=max(_WIDTH, Console().width))
+    console = Console(markup=False, soft_wrap=True, width=max(_WIDTH, Console().width))
     if replayed is not None:
         _run_again(console, replayed)
         return
@@ -95,8 +95,8 @@ def run_certify(
 def _certified(
     slices: Sequence[Slice], step: CompiledStep, seed: int
 ) -> tuple[list[Certificate], list[dict[str, object]], bool]:
-    columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
-    progress = Progress(*columns, console=Console(stderr=True), transient=True)
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
+    progress = Progress(*columns, console=Console(markup=False, stderr=True), transient=True)
     found: list[Certificate] = []
     refused: list[dict[str, object]] = []
     try:

@@ -16,7 +16,7 @@ def run_davinci(
     # Here, because sympy and plotly take a second to import, which no other command should wait for.
     from ..benchmarks.davinci import run_davinci as run
 
-    console = Console(soft_wrap=True)
+    console = Console(markup=False, soft_wrap=True)
     with console.status("starting") as status:
         found = run(out, on_stage=lambda stage: status.update(stage))
     figures = found.summary()

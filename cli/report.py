@@ -38,9 +38,9 @@ def run_report(
     # Drawing takes a second to import, and only this command draws.
     from ..benchmarks.report import Selection, write_report
 
-    errors = Console(stderr=True)
+    errors = Console(markup=False, stderr=True)
     progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
         console=errors, transient=True, disable=not errors.is_terminal,
     )  # fmt: skip
     with progress:
@@ -51,13 +51,13 @@ def run_report(
 
         chosen = Selection(tuple(scenario or ()), tuple(formulation or ()), tuple(solver or ()), start)
         report = write_report(Store(folder), figures=figures, selection=chosen, on_progress=on_progress)
-    console = Console(soft_wrap=True, highlight=False)
+    console = Console(markup=False, soft_wrap=True, highlight=False)
     console.print(
         f"Wrote {report.page} ({report.cells} cells, {report.page.stat().st_size / 1e6:.1f} MB)", markup=False
     )
     if report.figures:
-        console.print(f"and {len(report.figures)} figures to {report.figures[0].parent}.", markup=False)
-    console.print(f"Next: open {report.page} in a browser; it needs no network.", markup=False)
+        console.print(f"and {len(report.figures)} figures to {report.figures[0].parent}.")
+    console.print(f"Next: open {report.page} in a browser; it needs no network.")
 
 
 def run_compare(
@@ -87,21 +87,21 @@ def run_compare(
 
 
 def _print(found: Comparison, *, show_all: bool) -> None:
-    console = Console(width=max(_WIDTH, Console().width), highlight=False)
+    console = Console(markup=False, width=max(_WIDTH, Console().width), highlight=False)
     for warning in found.warnings:
-        console.print(f"note: {warning}", style="yellow", markup=False)
+        console.print(f"note: {warning}", style="yellow")
     for what, cells in (("A", found.only_a), ("B", found.only_b)):
         if cells:
             shown = cells if show_all else cells[:_SHOWN]
             more = f", and {len(cells) - len(shown)} more (--all)" if len(shown) < len(cells) else ""
-            console.print(f"only in {what} ({len(cells)}): {', '.join(shown)}{more}", markup=False)
+            console.print(f"only in {what} ({len(cells)}): {', '.join(shown)}{more}")
     for verdict in ("worse", "changed", "better"):
         some = found.of(verdict)
         if some:
             console.print(_table(verdict, some, show_all=show_all or verdict == "worse"))
     counts = ", ".join(f"{len(found.of(verdict))} {verdict}" for verdict in ("worse", "changed", "better"))
     timed = f"{found.timed} with times" if found.times_compared else "times not compared"
-    console.print(f"{found.compared} cells compared, {timed}: {counts}.", markup=False)
+    console.print(f"{found.compared} cells compared, {timed}: {counts}.")
     if found.regressed:
         console.print("Regressed. Next: kinqp report on both folders, and look at the cells above.", style="bold red")
     else:

@@ -29,9 +29,10 @@ def run_study(
     from ..benchmarks.study import study_settings
     from ..benchmarks.study.command import run_and_write
 
-    console, errors = Console(soft_wrap=True, highlight=False), Console(stderr=True)
+    console, errors = Console(markup=False, soft_wrap=True, highlight=False), Console(markup=False, stderr=True)
     progress = Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TimeRemainingColumn(),
         console=errors, transient=True,
     )  # fmt: skip
     settings = study_settings(operators=operators, trials=trials, seed=seed, dt=dt)

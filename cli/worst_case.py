@@ -36,7 +36,7 @@ def run_worst_case(
 ) -> None:
     """Search a compiled tick for the state with most iterations and for the slowest one."""
     # A narrower terminal, or none, would break columns; wrapped lines can still be read.
-    console = Console(soft_wrap=True, width=max(_WIDTH, Console().width))
+    console = Console(markup=False, soft_wrap=True, width=max(_WIDTH, Console().width))
     if replayed is not None:
         _show_again(console, replayed)
         return
@@ -45,11 +45,11 @@ def run_worst_case(
     console.print(f"compiling {formulation} on {robot}, {mode} ...", highlight=False)
     step = compile_step(load_robot(robot, tip=tip), formulation, mode)
     progress = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=Console(markup=False, stderr=True),
         transient=True,
     )
     with progress, interruptible() as interrupted:

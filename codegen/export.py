@@ -16,7 +16,7 @@ from ..formulations import ABOVE, DEFAULT_DT, Evaluator, Mode, get_formulation, 
 from ..solvers import get_solver
 from ..solvers.native import CompilerError, compiler
 from .emit import number
-from .fields import identifier
+from .fields import prefix_of
 from .model import step_code
 from .render import environment, library_version, render_step
 
@@ -97,7 +97,7 @@ def export_c(
     texts = [str(mode) for mode in parsed]
     if not parsed or len(set(texts)) < len(texts):
         raise ExportError(f"modes: expected at least one, each once, got {', '.join(texts) or 'none'}")
-    prefix = identifier(f"kinqp_{robot.name}_{made.name}") if name is None else name
+    prefix = prefix_of(robot.name, made.name) if name is None else name
     if not re.fullmatch(r"[a-z_][a-z0-9_]*", prefix):
         raise ExportError(f"name: expected a C identifier in lower case, got {prefix!r}")
     folder = Path(out)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # Arrays of generated code by the letter that formulas give them. Every name that generated code defines is in lower
 # case, or begins with KINQP_ or with the export's own prefix: a user's macro, such as -DN=3, never replaces one.
 C_NAMES: Final = {"H": "hessian", "A": "equalities", "C": "constraints", "J": "jacobian", "K": "command"}
+_LONGEST_NAME: Final = 80
 # New at every tick; all other run-time inputs are parameters.
 SIGNALS: Final = ("q", "v", "qd_prev", "v_fixed")
 # Parameters, with a default, that are new at every tick all the same: a batch takes a row of them for each.
@@ -137,6 +138,12 @@ def c_name(name: str) -> str:
 def identifier(text: str) -> str:
     """Turn a name into a C identifier: letters, digits and underscores of ASCII, in lower case."""
     return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_").lower()
+
+
+def prefix_of(robot: str, formulation: str) -> str:
+    """Return what the files and symbols of a formulation on a robot are called by, whatever the two are called."""
+    # A file's name must leave room for what is put behind.
+    return identifier(f"kinqp_{robot[:_LONGEST_NAME]}_{formulation[:_LONGEST_NAME]}")
 
 
 def field_of(given: Input) -> Field:

@@ -6,18 +6,35 @@ import re
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import jinja2
+from markupsafe import Markup
 
 from ..formulations import BOUND_TOLERANCE, FIXED_TOLERANCE
+from ..robots.text import in_c, in_cmake, in_markdown
 from ..solvers.active_set import embedded_source, fixed_size_sources
 from .emit import number
 from .fields import C_NAMES, MEMORY
 from .kernels import padded
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .model import StepCode
+
+# By the end of a template's name, the first that fits.
+_HARMLESS: Final[tuple[tuple[str, Callable[[str], str]], ...]] = (
+    (".md.j2", in_markdown),
+    ("CMakeLists.txt.j2", in_cmake),
+    ("cmake.j2", in_cmake),
+    (".j2", in_c),
+)
+
+
+class Code(Markup):
+    """C of our own, written as it is."""
+
 
 _INCLUDE = re.compile(r'^#include "([^"]+)"\n', flags=re.MULTILINE)
 # Matrices of the solver's problem, which its struct calls by the letters of formulas, where they are declared or read.
@@ -34,15 +51,30 @@ def library_version() -> str:
 
 @cache
 def environment() -> jinja2.Environment:
-    """Jinja2 with undefined names as errors; one for all, since it keeps the templates that it has read."""
+    """Jinja2 with undefined names as errors; one for all, since it keeps the templates that it has read.
+
+    Whatever is filled in is made harmless for the kind of file first, since it may be a name from a URDF; no template
+    has to ask for that. Only `Code` is written as it is: pieces of C that are more than a line, or hold comments.
+    """
     return jinja2.Environment(
         loader=jinja2.FunctionLoader(_template_text),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # noqa: S701  # the output is C, not HTML
+        autoescape=True,  # what macros return is `Code` then; `_harmless` decides what the escaping is
+        finalize=_harmless,
     )
+
+
+@jinja2.pass_context
+def _harmless(context: jinja2.runtime.Context, value: object) -> Code:
+    """Make what a template fills in harmless, once; the same for its constants, which are C and stay it."""
+    if isinstance(value, Markup):
+        return Code(value)
+    name = context.name or ""
+    neutral = next(function for ending, function in _HARMLESS if name.endswith(ending))
+    return Code(neutral(str(value)))
 
 
 def render_step(code: StepCode) -> dict[str, str]:
@@ -72,7 +104,7 @@ def step_values(code: StepCode) -> dict[str, Any]:
         "title": f"{code.formulation} on {code.robot}: {', '.join(mode.text for mode in code.modes)}",
         "summary": "One control cycle of a hand-guided arm: joint positions and hand velocity in, joint rates out.",
         "version": library_version(),
-        "status_header": fixed_size_sources()["kinqp_status.h"],
+        "status_header": Code(fixed_size_sources()["kinqp_status.h"]),
         "math_header": math_header(),
         "modes": code.modes,
         "parameters": code.parameters,
@@ -99,8 +131,8 @@ def step_values(code: StepCode) -> dict[str, Any]:
 def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
     """What the source takes beside the rest where every mode is a single QP."""
     return {
-        "solver_header": _INCLUDE.sub("", sources["kinqp_as.h"]),
-        "solver_source": _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources),
+        "solver_header": Code(_INCLUDE.sub("", sources["kinqp_as.h"])),
+        "solver_source": Code(_flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources)),
         "sizes": [{"n": n, "m": m} for n, m in code.sizes],
         "largest": max(n for n, _ in code.sizes),
         "most_equalities": max(1, *(mode.m_eq for mode in code.single)),
@@ -117,17 +149,17 @@ def render_batch(code: StepCode) -> str:
     return environment().get_template("batch.c.j2").render(values | {"signals": signals, "memory": memory})
 
 
-def general_solver() -> str:
+def general_solver() -> Code:
     """Source of the solver for sizes known at run time, in names that no user's macro replaces; see `C_NAMES`."""
-    return _MATRICES.sub(lambda match: C_NAMES[match[0]], embedded_source("KINQP_INLINE"))
+    return Code(_MATRICES.sub(lambda match: C_NAMES[match[0]], embedded_source("KINQP_INLINE")))
 
 
-def math_header() -> str:
+def math_header() -> Code:
     """Vectors of four numbers, and elementary functions on them."""
-    return _template_text("kinqp_lanes.h") + _template_text("kinqp_math.h")
+    return Code(_template_text("kinqp_lanes.h") + _template_text("kinqp_math.h"))
 
 
-def _kernels(code: StepCode) -> str:
+def _kernels(code: StepCode) -> Code:
     """Source of the kernels that any mode calls."""
     names = ["common", *(kernel for mode in code.single for kernel in mode.kernels)]
     if any(mode.shape.diagonal for mode in code.single):
@@ -136,7 +168,7 @@ def _kernels(code: StepCode) -> str:
         names.append("cholesky")
     if any(mode.m_eq for mode in code.single):
         names.append("null_space")
-    return "\n".join(_template_text(f"kernels/{name}.h") for name in dict.fromkeys(names))
+    return Code("\n".join(_template_text(f"kernels/{name}.h") for name in dict.fromkeys(names)))
 
 
 def _template_text(name: str) -> str:

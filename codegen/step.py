@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ..formulations import InputError, check_input
+from ..robots import real_array
 from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import NATIVE, build_library, declarations
 from . import qrqp
-from .fields import MEMORY, identifier
+from .fields import MEMORY, prefix_of
 from .model import step_code
 from .render import render_batch, render_step
 from .results import BatchResult, TickResult
@@ -79,7 +80,7 @@ class CompiledStep:
         self.robot: Final = robot
         self.formulation: Final = formulation
         self.mode: Final = mode
-        prefix = identifier(f"kinqp_{robot.name}_{formulation.name}")
+        prefix = prefix_of(robot.name, formulation.name)
         code = step_code(robot, formulation, [mode], prefix)
         self.code: Final[StepCode] = code
         files = render_step(code) if solver == SOLVER else qrqp.render_qrqp(code, formulation, robot, mode)
@@ -196,9 +197,9 @@ class CompiledStep:
             Naming the input that is not usable. A state that isn't finite refuses its own tick only, whose status is
             FAILED. NaN in `qdd_prev`, which may be infinite, refuses the batch.
         """
-        states = np.ascontiguousarray(Q, dtype=float)
-        twists = np.ascontiguousarray(V, dtype=float)
-        shapes = (len(states), self.robot.nv), (len(states), self.mode.m_free)
+        states = np.ascontiguousarray(real_array("Q", Q, InputError))
+        twists = np.ascontiguousarray(real_array("V", V, InputError))
+        shapes = (*states.shape[:1], self.robot.nv), (*states.shape[:1], self.mode.m_free)
         for name, values, shape in (("Q", states, shapes[0]), ("V", twists, shapes[1])):
             if values.shape != shape:
                 raise InputError(f"{name}: expected shape {shape}, got {values.shape}")
@@ -233,10 +234,7 @@ class CompiledStep:
             if name in self._required:
                 raise InputError(f"{name}: expected shape ({count}, {size}), got nothing")
             return np.zeros(0)
-        try:
-            values = np.ascontiguousarray(inputs[name], dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{name}: expected shape ({count}, {size}), got {inputs[name]!r}") from None
+        values = np.ascontiguousarray(real_array(name, inputs[name], InputError))
         if values.shape != (count, size):
             raise InputError(f"{name}: expected shape ({count}, {size}), one row for each tick, got {values.shape}")
         return values

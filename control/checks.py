@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..formulations import LONGEST_DT, SHORTEST_DT, InputError, Mode
+from ..robots import real_array
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,10 +25,7 @@ def checked_array(name: str, given: ArrayLike, size: int, *, finite: bool = True
     InputError
         Naming it, what was expected and what was got.
     """
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected {size} numbers, got {given!r}") from None
+    values = real_array(name, given, InputError)
     if values.shape != (size,):
         raise InputError(f"{name}: expected shape ({size},), got {values.shape}")
     if finite and not np.isfinite(values).all():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from ..codegen.fields import identifier
+from ..codegen.fields import prefix_of
 from ..codegen.model import step_code
 from ..codegen.render import render_step
 from ..codegen.step import STEP_FLAGS
@@ -72,7 +72,7 @@ class CompiledGuiding:
         self.modes: Final = checked_modes(modes)
         self.settings: Final = settings or GuidingSettings()
         self.dt: Final = checked_period(dt)
-        prefix = identifier(f"kinqp_{robot.name}_{made.name}")
+        prefix = prefix_of(robot.name, made.name)
         code = step_code(robot, made, self.modes, prefix)
         files = render_step(code) | render_guiding(code, robot, self.modes, self.settings, self.dt)
         ffi = cffi.FFI()

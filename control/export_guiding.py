@@ -8,7 +8,7 @@ import numpy as np
 
 from ..codegen.emit import number
 from ..codegen.export import TOLERANCE, export_c
-from ..codegen.fields import identifier
+from ..codegen.fields import prefix_of
 from ..codegen.model import step_code
 from ..codegen.render import environment
 from ..formulations import Mode, get_formulation
@@ -75,7 +75,7 @@ def export_guiding(
     parsed = checked_modes([modes] if isinstance(modes, str | Mode) else modes)
     made = get_formulation(formulation)
     folder = export_c(robot, made, list(parsed), out, name=name)
-    prefix = identifier(f"kinqp_{robot.name}_{made.name}") if name is None else name
+    prefix = prefix_of(robot.name, made.name) if name is None else name
     code = step_code(robot, made, parsed, prefix)
     files = render_guiding(code, robot, parsed, chosen)
     table = record(robot, made, parsed, chosen)

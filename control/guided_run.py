@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from ..robots import real_array
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -155,7 +157,7 @@ def simulate_guiding(
     controller.reset()
     hand.reset()
     robot = controller.robot
-    q = np.array(q0, dtype=float)
+    q = real_array("q0", q0).copy()
     if q.shape != (robot.nv,) or not np.isfinite(q).all():
         raise ValueError(f"q0: expected {robot.nv} finite numbers, got {q0!r}")
     record = _Record(robot, dt, ticks)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..robots import real_array
 from .position_observer import JUMP
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ class GuidingSettings:
 
     def __post_init__(self) -> None:
         for name in ("admittance_mass", "admittance_damping"):
-            value = np.asarray(getattr(self, name), dtype=float)
+            value = real_array(name, getattr(self, name))
             if value.shape != (6,) or not (np.isfinite(value).all() and (value > 0.0).all()):
                 raise ValueError(f"{name}: expected 6 positive numbers, got {getattr(self, name)!r}")
             object.__setattr__(self, name, tuple(map(float, value)))

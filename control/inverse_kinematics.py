@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..formulations import JointSpace, Mode, ModeError
-from ..robots import finite_vector
+from ..robots import finite_vector, real_array
 from ..solvers import Status
 from .ik_result import IkResult, IkStatus
 from .step import make_step
@@ -211,7 +211,7 @@ class InverseKinematics:
 
     def _goal(self, target: ArrayLike, start: Array) -> Array:
         """Pose to go to, (4, 4), with the rows that the mode locks left at the start."""
-        given = np.asarray(target, dtype=float)
+        given = real_array("target", target)
         if given.shape not in ((3,), (4, 4)) or not np.isfinite(given).all():
             raise ValueError(f"target: expected 3 coordinates or a (4, 4) pose, all finite, got {target!r}")
         pose = start.copy()

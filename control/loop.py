@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from ..formulations import DEFAULT_DT
+from ..formulations import DEFAULT_DT, InputError
+from ..robots import real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -183,7 +184,7 @@ def simulate(
     if ticks < 2:
         raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
     free = list(step.mode.free_rows)
-    q = np.array(q0, dtype=float)
+    q = real_array("q0", q0, InputError).copy()
     memory = {name: np.zeros(step.robot.nv) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
     qd = np.zeros(step.robot.nv)
     states, twists, positions, results = [], [], [], []

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..robots import real_array
 from .hand import EXPERT, SpringHand, length, rotation_vector
 from .reference import WaitingReference
 from .steering import Doing, Steering
@@ -61,7 +62,7 @@ class Operator:
         tremor: bool = True,
         tolerance: float = 0.01,
     ) -> None:
-        towards = None if stance is None else np.array(stance, dtype=float)
+        towards = None if stance is None else real_array("stance", stance).copy()
         if towards is not None and not (towards.shape == (3,) and np.isfinite(towards).all() and towards.any()):
             raise ValueError(f"stance: expected a vector of shape (3,), not zero, got {stance!r}")
         if not (np.isfinite(tolerance) and tolerance > 0.0):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..robots import finite_vector
+from ..robots import finite_vector, real_array
 from .ik_result import IkStatus
 from .posture import relax
 
@@ -91,7 +91,7 @@ def solve_points(
     ValueError
         When an input has the wrong shape or is not finite.
     """
-    given = np.asarray(targets, dtype=float)
+    given = real_array("targets", targets)
     if given.ndim not in (2, 3) or len(given) == 0:
         raise ValueError(f"targets: expected shape (N, 3) or (N, 4, 4), got {given.shape}")
     q = finite_vector("q0", q0, ik.robot.nv)

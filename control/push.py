@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..robots import real_array
 from .hand import EXPERT, limited
 from .tremor import Tremor
 
@@ -63,7 +64,7 @@ class Push:
         tool_axes: bool = False,
         tremor: bool = True,
     ) -> None:
-        mean = np.array(wrench, dtype=float)
+        mean = real_array("wrench", wrench).copy()
         if mean.shape != (6,) or not np.isfinite(mean).all():
             raise ValueError(f"wrench: expected shape (6,), finite, got {wrench!r}")
         if not (0.0 <= wander < 1.0 and 0.0 <= ramp < np.inf):

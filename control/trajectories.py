@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import ruckig
 
-from ..robots import finite_vector
+from ..robots import finite_vector, real_array
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -54,7 +54,7 @@ class CubicStopAndGo:
     times: Array
 
     def __post_init__(self) -> None:
-        points, times = np.array(self.points, dtype=float), np.array(self.times, dtype=float)
+        points, times = (real_array(name, getattr(self, name)).copy() for name in ("points", "times"))
         if points.ndim != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"points: expected at least 2 rows of finite joint positions, got shape {points.shape}")
         if times.shape != (len(points),) or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
@@ -75,7 +75,7 @@ class CubicStopAndGo:
         qd_max, qdd_max : array_like, shape (nv,)
             Limits [rad/s or m/s; rad/s^2 or m/s^2].
         """
-        way = np.asarray(points, dtype=float)
+        way = real_array("points", points)
         distance = np.abs(np.diff(way, axis=0))
         speed, acceleration = _limits(qd_max, qdd_max, way.shape[-1])
         needed = np.maximum(1.5 * distance / speed, np.sqrt(6.0 * distance / acceleration)).max(axis=1, initial=0.0)
@@ -102,7 +102,7 @@ class CubicStopAndGo:
         t : array_like, shape (M,)
             [s].
         """
-        asked = np.atleast_1d(np.asarray(t, dtype=float))
+        asked = np.atleast_1d(real_array("t", t))
         if asked.ndim != 1 or not np.isfinite(asked).all():
             raise ValueError(f"t: expected a row of finite times, got {t!r}")
         clipped = np.clip(asked, self.times[0], self.times[-1])
@@ -181,7 +181,7 @@ def checked_job(points: ArrayLike, qd_max: ArrayLike, qdd_max: ArrayLike, dt: fl
     ValueError
         When an input has the wrong shape or is out of range.
     """
-    way = np.asarray(points, dtype=float)
+    way = real_array("points", points)
     if way.ndim != 2 or len(way) < 2 or not np.isfinite(way).all():
         raise ValueError(f"points: expected at least 2 rows of finite joint positions, got shape {way.shape}")
     if not 0.0 < dt < np.inf:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from ..robots.text import in_markdown, one_line
 from .hierarchy import Hierarchy
 from .latex import Notation
 from .lowering import lower
@@ -24,13 +25,13 @@ _MANY: Final = 8
 
 def describe(formulation: Formulation, robot: Robot, mode: Mode) -> str:
     """Write a formulation on a robot in a mode as Markdown; see `Formulation.describe`."""
-    title = f"# `{formulation.name}` on `{robot.name}`, mode `{mode}`"
+    title = "# `{}` on `{}`, mode `{}`".format(*map(in_markdown, (formulation.name, robot.name, str(mode))))
     if not isinstance(formulation, Hierarchy):
         return "\n\n".join([title, *_sections(formulation, robot, mode, "##")]) + "\n"
-    names = " > ".join(level.name for level in formulation.levels)
+    names = " > ".join(in_markdown(level.name) for level in formulation.levels)
     parts = [title, _summary(formulation), f"{len(formulation.levels)} QPs, solved in order: {names}."]
     for level in formulation.levels:
-        parts += [f"## Level `{level.name}`", *_sections(level, robot, mode, "###")]
+        parts += [f"## Level `{in_markdown(level.name)}`", *_sections(level, robot, mode, "###")]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -122,4 +123,4 @@ def _input(given: Input) -> tuple[str, ...]:
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(cell.replace("|", r"\|") for cell in line) + " |" for line in lines)
+    return "\n".join("| " + " | ".join(one_line(cell).replace("|", r"\|") for cell in line) + " |" for line in lines)

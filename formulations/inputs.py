@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..robots import real_array
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -29,10 +31,7 @@ def check_input(spec: Input, given: ArrayLike, mode: Mode) -> Array:
     InputError
         Naming the input, what was expected and what was got.
     """
-    try:
-        value = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got {given!r}") from None
+    value = real_array(spec.name, given, InputError)
     if value.shape != (spec.size,) and not (spec.default is not None and value.ndim == 0):
         raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got shape {value.shape}")
     if np.isnan(value).any() or (np.isinf(value).any() and not spec.may_be_infinite):

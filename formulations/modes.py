@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import casadi as ca
 import numpy as np
 
+from ..robots import real_array
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
@@ -114,10 +116,7 @@ class Mode:
             follows the normal's largest component (x, y, z, x, ...), projected into the plane, and the normal's
             cross product with it: for the normal z they are x and y, for y they are z and x.
         """
-        try:
-            n = np.asarray(normal, dtype=float)
-        except (TypeError, ValueError):
-            n = np.zeros(0)
+        n = real_array("plane normal", normal, ModeError)
         if n.shape != (3,) or not np.all(np.isfinite(n)) or not n.any():
             raise ModeError(f"plane normal: expected 3 finite numbers, not all zero, got {normal!r}")
         n = n / np.max(np.abs(n))  # first, so that the norm of a huge or tiny one is neither infinite nor zero

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
+from ..robots import real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from ..solvers import Status
@@ -70,7 +71,7 @@ def one_by_one(
     ValueError
         When Q and V have not as many rows.
     """
-    states, twists = np.asarray(Q, dtype=float), np.asarray(V, dtype=float)
+    states, twists = real_array("Q", Q), real_array("V", V)
     if states.ndim != 2 or twists.ndim != 2 or len(states) != len(twists):
         raise ValueError(f"Q and V: expected as many rows in both, got shapes {states.shape}, {twists.shape}")
     return [step(q, v, **inputs) for q, v in zip(states, twists, strict=True)]

@@ -5,7 +5,7 @@ Use `load_robot`; everything else is for those who add a robot or build on one.
 """
 
 from .capsules import Capsule, CapsuleModel, capsule_model
-from .checks import FloatArray, finite_vector
+from .checks import FloatArray, finite_vector, real_array
 from .dh import DhRow, robot_from_dh
 from .errors import RobotError
 from .limits import DEFAULT_PRISMATIC_QDD_MAX, DEFAULT_REVOLUTE_QDD_MAX
@@ -32,6 +32,7 @@ __all__ = [
     "capsule_model",
     "finite_vector",
     "load_robot",
+    "real_array",
     "robot_from_dh",
     "robot_from_urdf",
     "sample_workspace",

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from .chain import joint_axis
+from .errors import RobotError
 from .limits import acceleration_limits
 from .robot import Robot
 
@@ -36,9 +37,12 @@ def robot_from_model(name: str, tip: str, model: Any, qdd_max: ArrayLike | None)
 
     Raises
     ------
+    RobotError
+        If a number of the model is not finite.
     ValueError
         If `qdd_max` does not fit.
     """
+    _require_finite(model, tip)
     joints = list(model.joints)[1:]
     continuous = np.array([joint.nq == 2 for joint in joints])
     first = [joint.idx_q for joint in joints]
@@ -56,9 +60,25 @@ def robot_from_model(name: str, tip: str, model: Any, qdd_max: ArrayLike | None)
     )
 
 
+def _require_finite(model: Any, tip: str) -> None:
+    """Refuse a model of which any answer would be no number; files may say NaN or 1e999 anywhere."""
+    for index in range(1, model.njoints):
+        for what, numbers in (
+            ("position", model.jointPlacements[index].homogeneous),
+            ("mass and inertia of what it moves", model.inertias[index].toDynamicParameters()),
+        ):
+            if not np.isfinite(numbers).all():
+                raise RobotError(f"joint {model.names[index]!r}: expected finite numbers for {what}, got {numbers}")
+    tool = model.frames[model.getFrameId(tip, pin.FrameType.BODY)].placement.homogeneous
+    if not np.isfinite(tool).all():
+        raise RobotError(f"tip {tip!r}: expected finite numbers for its place, got {tool}")
+
+
 def _has_inertia(model: Any) -> bool:
     """Return whether the inertia matrix is safely positive definite at pinocchio's neutral configuration."""
     matrix = np.triu(pin.crba(model, model.createData(), pin.neutral(model)))
+    if not np.isfinite(matrix).all():
+        return False  # masses and lengths whose products leave the range of a double
     values = np.linalg.eigvalsh(matrix, UPLO="U")
     # A link without <inertial> has an eigenvalue of 0 up to rounding; real arms stay above 1e-6 of the
     # largest.

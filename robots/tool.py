@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pinocchio as pin
 
+from .checks import real_array
 from .errors import RobotError
 
 if TYPE_CHECKING:
@@ -63,10 +64,7 @@ def with_tool(robot: Robot, name: str, pose: ArrayLike, *, tip: str = "tool_tip"
 
 def _placement(pose: ArrayLike) -> pin.SE3:
     expected = "pose of a tool: expected shape (3,) or a homogeneous (4, 4), finite"
-    try:
-        values = np.asarray(pose, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise RobotError(f"{expected}, got {pose!r}") from None
+    values = real_array("pose of a tool", pose, RobotError)
     if values.shape not in ((3,), (4, 4)) or not np.isfinite(values).all():
         raise RobotError(f"{expected}, got {values}")
     if values.shape == (3,):

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pinocchio as pin
 
 from .assembly import robot_from_model
 from .errors import RobotError
-from .urdf_tree import check_joint, choose_tip, read_tree
+from .urdf_tree import check_joint, check_length, choose_tip, read_tree
 
 if TYPE_CHECKING:
     import os
@@ -64,15 +64,20 @@ def robot_from_urdf(
     tree = read_tree(text, source)
     tip = choose_tip(tree, tip)
     chain = tree.chain(tip)
+    check_length(chain, source)
     for joint in chain:
         check_joint(joint)
     try:
-        model = pin.buildModelFromXML(text)
+        model = _chain_model(text, {joint.name for joint in chain if joint.kind != "fixed"})
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise RobotError(f"{source}: expected a URDF file, got one that pinocchio rejects ({reason})") from error
-    moving = {joint.name for joint in chain if joint.kind != "fixed"}
-    locked = [index for index, joint_name in enumerate(model.names) if index > 0 and joint_name not in moving]
-    model = pin.buildReducedModel(model, locked, pin.neutral(model))
     model.name = name or tree.name or file.stem
     return robot_from_model(model.name, tip, model, qdd_max)
+
+
+def _chain_model(text: str, moving: set[str]) -> Any:
+    """Read a file into a `pin.Model` in which all joints but these are locked at neutral."""
+    model = pin.buildModelFromXML(text)
+    locked = [index for index, name in enumerate(model.names) if index > 0 and name not in moving]
+    return pin.buildReducedModel(model, locked, pin.neutral(model))

@@ -15,17 +15,32 @@ from .errors import RobotError
 
 _LIMITED = ("revolute", "prismatic")
 _SUPPORTED = (*_LIMITED, "continuous", "fixed")
+#: More than any machine has that is described in one file, humanoids with both hands included; what pinocchio needs
+#: grows with the square of it, in memory and in time.
+_MOST_LINKS = 1000
+#: Of a joint's origin [m or rad]; beyond, rounding of a position would be visible.
+_FARTHEST = 1e6
+#: More joints than any arm has. A snake robot has thirty.
+_MOST_JOINTS = 100
+#: URDF wants axes of length 1. Files hold rounded ones, and (0 0 2); far from 1 it is a slip, and what is left of a
+#: direction may be rounding. Beyond 1e-154 and 1e154 squares leave the range of a double.
+_AXIS_LENGTHS = (1e-3, 1e3)
 
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint as the file has it; `limit` holds the attributes of <limit>, None without that element."""
+    """
+    A joint as the file has it.
+
+    `origin`, `axis` and `limit` hold the attributes of these elements, None without the element.
+    """
 
     name: str
     kind: str
     parent: str
     child: str
-    axis: str
+    origin: dict[str, str] | None
+    axis: dict[str, str] | None
     limit: dict[str, str] | None
     mimics: str | None
 
@@ -80,7 +95,7 @@ def read_tree(text: str, source: str) -> UrdfTree:
     Raises
     ------
     RobotError
-        If the text is not the XML of a URDF, or its links are not one tree.
+        If the text is not the XML of a URDF, its links are too many, or they are not one tree.
     """
     try:
         root = ET.fromstring(text)  # noqa: S314 - the user's own file, as trusted as code
@@ -91,11 +106,16 @@ def read_tree(text: str, source: str) -> UrdfTree:
     if any("xacro}" in element.tag for element in root.iter() if isinstance(element.tag, str)):
         raise RobotError(f"{source}: expected a URDF file, got xacro macros; expand them first with the xacro tool")
     links = tuple(element.get("name", "") for element in root.findall("link"))
+    if len(links) > _MOST_LINKS:
+        raise RobotError(
+            f"{source}: expected at most {_MOST_LINKS} links, got {len(links)}; leave out what is not the arm"
+        )
+    known = set(links)
     joint_to: dict[str, UrdfJoint] = {}
     for element in root.findall("joint"):
         joint = _read_joint(element)
         for link in (joint.parent, joint.child):
-            if link not in links:
+            if link not in known:
                 raise RobotError(f"{source}: joint {joint.name!r} expected a link of the file, got {link!r}")
         if joint.child in joint_to:
             raise RobotError(
@@ -118,14 +138,18 @@ def _read_joint(element: ET.Element) -> UrdfJoint:
         found = element.find(tag)
         return None if found is None else found.get(attribute)
 
-    limit = element.find("limit")
+    def attributes(tag: str) -> dict[str, str] | None:
+        found = element.find(tag)
+        return None if found is None else dict(found.attrib)
+
     return UrdfJoint(
         name=element.get("name", ""),
         kind=element.get("type", ""),
         parent=child("parent", "link") or "",
         child=child("child", "link") or "",
-        axis=child("axis", "xyz") or "1 0 0",
-        limit=None if limit is None else dict(limit.attrib),
+        origin=attributes("origin"),
+        axis=attributes("axis"),
+        limit=attributes("limit"),
         mimics=child("mimic", "joint"),
     )
 
@@ -170,6 +194,23 @@ def choose_tip(tree: UrdfTree, tip: str | None) -> str:
     return tip
 
 
+def check_length(chain: tuple[UrdfJoint, ...], source: str) -> None:
+    """
+    Check that a chain is an arm.
+
+    Raises
+    ------
+    RobotError
+        If more joints move than any arm has.
+    """
+    moving = sum(joint.kind != "fixed" for joint in chain)
+    if moving > _MOST_JOINTS:
+        raise RobotError(
+            f"{source}: expected at most {_MOST_JOINTS} moving joints between base and tip, got {moving}; "
+            "name a tip before the last"
+        )
+
+
 def check_joint(joint: UrdfJoint) -> None:
     """
     Check that a joint on the chain is of a kind this library can control, with the limits it needs.
@@ -177,8 +218,8 @@ def check_joint(joint: UrdfJoint) -> None:
     Raises
     ------
     RobotError
-        If the kind is not supported, the joint mimics another, its axis is zero, or a limit is missing or
-        useless.
+        If the kind is not supported, the joint mimics another, its origin or axis can't be read or is useless, or
+        a limit is missing or useless.
     """
     label = f"joint {joint.name!r}"
     if joint.kind == "floating":
@@ -188,6 +229,7 @@ def check_joint(joint: UrdfJoint) -> None:
             f"{label}: expected one of {', '.join(_SUPPORTED)} between base and tip, got {joint.kind!r}; "
             "name a tip before it, or replace it by joints with one axis each"
         )
+    _check_origin(label, joint.origin)
     if joint.kind == "fixed":
         return
     if joint.mimics is not None:
@@ -227,10 +269,45 @@ def _number(label: str, what: str, limit: dict[str, str]) -> float:
         raise RobotError(f"{label}: expected a number for its {what} limit, got {limit[what]!r}") from error
 
 
-def _check_axis(label: str, text: str) -> None:
+def _check_origin(label: str, origin: dict[str, str] | None) -> None:
+    """Refuse what pinocchio would take for zero: an attribute that it does not know."""
+    for what, text in (origin or {}).items():
+        if what not in ("xyz", "rpy"):
+            raise RobotError(
+                f"{label}: expected xyz and rpy in its <origin>, got {what!r}; correct the attribute's name"
+            )
+        numbers = _numbers_in(text)
+        if len(numbers) != 3 or max(map(abs, numbers)) > _FARTHEST:
+            raise RobotError(
+                f"{label}: expected {what} of its <origin> as three finite numbers of at most {_FARTHEST:g}, "
+                f"got {text!r}"
+            )
+
+
+def _check_axis(label: str, given: dict[str, str] | None) -> None:
+    if given is None:
+        return  # URDF's default, (1 0 0)
+    if set(given) != {"xyz"}:
+        got = ", ".join(map(repr, given)) or "none"
+        raise RobotError(
+            f"{label}: expected the attribute xyz and no other in its <axis> element, got {got}; "
+            'write <axis xyz="0 0 1"/>, or leave the element out for URDF\'s default, x'
+        )
+    axis = _numbers_in(given["xyz"])
+    if len(axis) != 3 or not any(axis):
+        raise RobotError(f"{label}: expected an axis of three numbers that are not all zero, got {given['xyz']!r}")
+    length = math.hypot(*axis)
+    if not _AXIS_LENGTHS[0] <= length <= _AXIS_LENGTHS[1]:
+        raise RobotError(
+            f"{label}: expected an axis of length 1 (from {_AXIS_LENGTHS[0]:g} to {_AXIS_LENGTHS[1]:g} it is "
+            f"normalised), got {given['xyz']!r} of length {length:.3g}"
+        )
+
+
+def _numbers_in(text: str) -> list[float]:
+    """Finite numbers of an attribute; none where one of them is not."""
     try:
-        axis = [float(part) for part in text.split()]
+        numbers = [float(part) for part in text.split()]
     except ValueError:
-        axis = []
-    if len(axis) != 3 or not 0.0 < math.hypot(*axis) < math.inf:
-        raise RobotError(f"{label}: expected an axis of three numbers that are not all zero, got {text!r}")
+        return []
+    return numbers if all(map(math.isfinite, numbers)) else []

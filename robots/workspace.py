@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
+from .checks import real_array
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -42,7 +44,7 @@ def tool_positions(robot: Robot, Q: ArrayLike) -> FloatArray:
     ValueError
         If `Q` has the wrong shape or is not finite.
     """
-    states = np.asarray(Q, dtype=np.float64)
+    states = real_array("Q", Q)
     if states.ndim != 2 or states.shape[1] != robot.nv or not np.isfinite(states).all():
         raise ValueError(f"Q: expected finite joint positions of shape (N, {robot.nv}), got shape {states.shape}")
     q = ca.SX.sym("q", robot.nv)

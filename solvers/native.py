@@ -3,6 +3,9 @@
 Libraries are kept in a cache, ``$KINQP_CACHE`` or else ``$XDG_CACHE_HOME/kinqp`` or ``~/.cache/kinqp``, under a hash of
 everything that decides what they contain. A file appears there finished and in one step, with its own checksum at the
 end, so any number of processes may build and load at once, and a damaged file is noticed and replaced.
+
+What is loaded runs. The checksum is against accidents only, so the folder and its files must be such that nobody else
+can write there, as OpenSSH demands of keys: owned by this user or root, writable by no one else.
 """
 
 from __future__ import annotations
@@ -13,15 +16,17 @@ import platform
 import re
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
+import time
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 #: ``-ffp-contract=off``: the same bits whether or not the machine can fuse a multiplication with an addition.
 #: ``-fno-tree-slp-vectorize``: at three to seven columns, packing scalars into vectors costs more than it saves.
@@ -42,6 +47,10 @@ _COMPILERS = ("cc", "gcc", "clang")
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 #: Lines of the compiler's own words in an error message.
 _MESSAGE_LINES = 12
+#: Folders in the cache in which something is being built.
+_SCRATCH = ".kinqp-build-"
+#: A build takes seconds; what is older was killed [s].
+_ABANDONED = 3600.0
 
 
 class CompilerError(RuntimeError):
@@ -69,7 +78,7 @@ def build_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str]
     Raises
     ------
     CompilerError
-        When there is no compiler, it fails, or the cache cannot be written.
+        When there is no compiler, it fails, or the cache cannot be written or is open to other users.
     ValueError
         When a name is no plain file name, or nothing among the sources is C.
     """
@@ -86,12 +95,14 @@ def build_library(name: str, sources: Mapping[str, str], *, flags: Sequence[str]
     if not machine:
         flags = [flag for flag in flags if flag != NATIVE]
     library = cache_directory() / f"{name}-{_key(sources, flags, command, machine)}.so"
-    if _intact(library):
-        return library
     try:
-        library.parent.mkdir(parents=True, exist_ok=True)
+        library.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        _require_own(library.parent)
+        if _trusted(library.lstat) and _intact(library):
+            return library
+        _clear_abandoned(library.parent)
         # In the same directory, because only there a file can be moved into place in one step.
-        with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=library.parent, ignore_cleanup_errors=True) as scratch:
+        with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=library.parent, ignore_cleanup_errors=True) as scratch:
             made = _compile(Path(scratch), sources, units, flags, command)
             made.replace(library)
     except OSError as error:
@@ -190,12 +201,61 @@ def _compile(
         raise CompilerError(f"{shlex.join(line)} failed with code {answer.returncode}:\n" + "\n".join(words))
     content = made.read_bytes()
     made.write_bytes(content + hashlib.sha256(content).digest())
+    made.chmod(0o755)  # whatever the umask: what others may write is not loaded
     return made
 
 
 def _run(line: Sequence[str], directory: Path | None = None) -> subprocess.CompletedProcess[str]:
     # What runs is the compiler that the user chose, with arguments in a list and without a shell.
     return subprocess.run(line, cwd=directory, capture_output=True, text=True, errors="replace", check=False)
+
+
+def _require_own(folder: Path) -> None:
+    """Refuse a cache in which another user could put a library for us to load.
+
+    Raises
+    ------
+    CompilerError
+        When the folder belongs to another user, others may write there, or they may move a folder above it.
+    """
+    real = folder.resolve()
+    if not _trusted(real.stat):
+        found = real.stat()
+        raise CompilerError(
+            f"the cache of C libraries, {folder}: expected a folder of this user that no one else may write to, got "
+            f"one of user {found.st_uid} with mode {stat.S_IMODE(found.st_mode):o}, whose libraries would run "
+            f"here; chmod go-w it if it is yours, or set KINQP_CACHE to another"
+        )
+    for above in real.parents:
+        mode = above.stat().st_mode
+        if hasattr(os, "getuid") and mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            raise CompilerError(
+                f"the cache of C libraries, {folder}: expected to be where no one else can replace it, but everyone "
+                f"may write to {above}; set KINQP_CACHE to another"
+            )
+
+
+def _trusted(status: Callable[[], os.stat_result]) -> bool:
+    """Whether a file or folder is this user's or root's, and no one else may write to it; not, where there is none."""
+    try:
+        found = status()
+    except FileNotFoundError:
+        return False
+    if not hasattr(os, "getuid"):
+        return True  # where access is not a matter of owner and mode
+    known = stat.S_ISREG(found.st_mode) or stat.S_ISDIR(found.st_mode)
+    return known and found.st_uid in (os.geteuid(), 0) and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _clear_abandoned(folder: Path) -> None:
+    """Remove what killed builds have left."""
+    for left in folder.glob(f"{_SCRATCH}*"):
+        try:
+            old = time.time() - left.lstat().st_mtime > _ABANDONED
+        except FileNotFoundError:
+            continue  # another process was faster
+        if old:
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _intact(library: Path) -> bool:

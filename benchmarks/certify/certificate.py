@@ -211,5 +211,5 @@ def read_certificates(path: Path) -> Certificates:
             for x in given["certificates"]
         ]
         return Certificates(**{**given, "certificates": certificates})
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CaseError(f"{expected}: {error}") from error

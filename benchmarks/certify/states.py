@@ -46,7 +46,7 @@ def read_state(path: Path, nv: int) -> State:
         given = given.get("most", given)
         q = np.array(given["q"], dtype=float)
         limits = {name: np.array(values, dtype=float) for name, values in given.get("limits", {}).items()}
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CaseError(f"{expected}: {error}") from error
     if q.shape != (nv,):
         raise CaseError(f"{expected}, got q of shape {q.shape}")

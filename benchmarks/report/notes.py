@@ -11,7 +11,7 @@ from ..metrics import REQUIREMENTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..store import Manifest
+    from ..manifest import Manifest
     from .source import Case
 
 _ALWAYS: Final = (

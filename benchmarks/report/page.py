@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from ..manifest import Manifest
     from ..scenarios import Scenario
-    from ..store import Manifest
     from .profiles import Profile
     from .source import Case
 

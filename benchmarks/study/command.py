@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING, Final
 
 from ..conditions import conditions
+from ..reading import read_object
 from ..store import write_whole
 from .trials import run_study
 from .write import write_study
@@ -51,5 +52,5 @@ def run_and_write(
     study = run_study(settings, folder, processes=processes, resume=resume, overwrite=overwrite, on_trial=on_trial)
     if not path.exists():
         write_whole(path, (json.dumps(now, indent=1) + "\n").encode())
-    known: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))
+    known: dict[str, str] = read_object(path, "delete it, and the study is told to be of today")
     return write_study(study, folder, known, on_stage=on_stage)

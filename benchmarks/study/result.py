@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
+from ..reading import read_frame, read_object
 from ..store import parquet, write_whole
 from .run_frame import frame_of, run_of, torque_of
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 ALGORITHMS: Final[dict[str, str]] = {"A": "task-priority", "B": "saturation-null-space", "C": "joint-space"}
 
 _FORMAT: Final = 1
+_ANEW: Final = "take it from a copy, or run the study again with --resume"
 #: Columns of `StudyResult.trials`, in order.
 TRIAL_COLUMNS: Final[dict[str, pl.DataType]] = {
     "algorithm": pl.String(),
@@ -183,16 +185,16 @@ class StudyResult:
         """
         path = folder / "settings.json"
         try:
-            content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+            content = read_object(path, _ANEW)
+        except OSError as error:
             raise StudyError(f"{folder}: expected a study's settings.json there: {error}") from error
         if content.get("format") != _FORMAT:
             raise StudyError(f"{path}: expected format {_FORMAT}, got {content.get('format')!r}")
         settings = StudySettings.from_json(content["settings"])
-        trials = pl.read_parquet(folder / "trials.parquet")
+        trials = read_frame(folder / "trials.parquet", _ANEW)
         if dict(trials.schema) != TRIAL_COLUMNS:
             raise StudyError(f"{folder / 'trials.parquet'}: expected columns {TRIAL_COLUMNS}, got {trials.schema}")
-        frames = {letter: pl.read_parquet(folder / "runs" / f"{letter}.parquet") for letter in content["q_end"]}
+        frames = {letter: read_frame(folder / "runs" / f"{letter}.parquet", _ANEW) for letter in content["q_end"]}
         runs = {
             letter: run_of(frame, settings.robot, settings.dt, np.array(content["q_end"][letter]))
             for letter, frame in frames.items()

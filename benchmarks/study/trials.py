@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import polars as pl
 
+from ..lock import sole_writer
 from ..processes import ONE_THREAD
+from ..reading import read_object
 from ..store import write_whole
 from .outcomes import joint_torques
 from .plan import Course, Trial, trials_of
@@ -60,7 +62,14 @@ def run_study(
     """
     if processes < 1:
         raise StudyError(f"processes: expected at least one, got {processes}")
-    _begin(settings, folder, resume=resume, overwrite=overwrite)
+    with sole_writer(folder):
+        _begin(settings, folder, resume=resume, overwrite=overwrite)
+        return _run(settings, folder, processes, on_trial)
+
+
+def _run(
+    settings: StudySettings, folder: Path, processes: int, on_trial: Callable[[int, int], None] | None
+) -> StudyResult:
     trials = trials_of(settings)
     left = [trial for trial in trials if not _path(folder, trial).exists()]
     tell = on_trial or (lambda _done, _all: None)
@@ -82,7 +91,7 @@ def _begin(settings: StudySettings, folder: Path, *, resume: bool, overwrite: bo
                 f"{folder} holds a study already: give --resume to continue it, --overwrite to replace it, "
                 "or another folder with --out"
             )
-        if json.loads(plan.read_text(encoding="utf-8")) != asked:
+        if read_object(plan, "take it from a copy, or begin the study anew with --overwrite") != asked:
             raise StudyError(f"{folder} holds a study with other settings: expected the same to resume it")
     else:
         plan.unlink(missing_ok=True)
@@ -171,7 +180,7 @@ class _Worker:
 
 
 def _result(settings: StudySettings, folder: Path, trials: Sequence[Trial]) -> StudyResult:
-    rows: list[dict[str, Any]] = [json.loads(_path(folder, trial).read_text(encoding="utf-8")) for trial in trials]
+    rows: list[dict[str, Any]] = [read_object(_path(folder, trial), _AGAIN) for trial in trials]
     frame = pl.DataFrame(rows, schema=TRIAL_COLUMNS).sort("algorithm", "operator", "trial")
     chosen = representative(frame)
     course = Course.of(settings)
@@ -191,6 +200,9 @@ def representative(trials: pl.DataFrame) -> tuple[int, int]:
     off = trials.with_columns(((pl.col("time").rank("average") - middle).abs()).over("algorithm").alias("off"))
     best = off.group_by("operator", "trial").agg(pl.col("off").sum()).sort("off", "operator", "trial").row(0)
     return int(best[0]), int(best[1])
+
+
+_AGAIN = "delete it and continue the study with --resume, which runs that trial again"
 
 
 def _path(folder: Path, trial: Trial) -> Path:

@@ -169,7 +169,7 @@ def read_case(path: Path) -> WorstCase:
         if given.pop("kind") != _KIND:
             raise CaseError(f"{path}: expected a file that kinqp worst-case has written")
         return WorstCase(**{**given, "most": Found.read(given["most"]), "slowest": Found.read(given["slowest"])})
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise CaseError(f"{path}: expected a file that kinqp worst-case has written: {error}") from error
 
 

@@ -50,7 +50,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
             with contextlib.suppress(OSError, ValueError):
                 address = json.loads(file.read_text())["address"]
             time.sleep(0.05)
-        yield address, started[1:]
+        yield address, started
     finally:
         for process in started:
             process.kill()
@@ -60,7 +60,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]
 def test_a_cluster_gives_the_same_and_a_lost_worker_costs_nothing(
     cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
 ) -> None:
-    address, workers = cluster
+    address, (_scheduler, *workers) = cluster
     killed: list[int] = []
 
     def kill_one(done: int, _total: int, _what: str) -> None:
@@ -80,3 +80,17 @@ def test_a_cluster_gives_the_same_and_a_lost_worker_costs_nothing(
 def test_no_scheduler_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ClusterError, match=r"expected a Dask scheduler at tcp://127\.0\.0\.1:9, got"):
         sweep(TINY, tmp_path, scheduler="tcp://127.0.0.1:9")
+
+
+def test_a_scheduler_that_dies_is_one_sentence_and_what_came_back_is_kept(
+    cluster: tuple[str, list[subprocess.Popen[bytes]]], tmp_path: Path
+) -> None:
+    address, (scheduler, *_workers) = cluster
+
+    def kill(done: int, _total: int, _what: str) -> None:
+        if done == 1:
+            scheduler.kill()
+
+    with pytest.raises(ClusterError, match=r"--scheduler: expected the Dask scheduler at .* it is gone .* --resume"):
+        sweep(TINY, tmp_path, scheduler=address, on_progress=kill)
+    assert len(list((tmp_path / "ticks").iterdir())) >= 1

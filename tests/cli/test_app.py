@@ -103,6 +103,27 @@ def test_a_mistake_is_one_sentence_and_nothing_is_written(tmp_path: Path, text: 
     assert not (tmp_path / "out").exists()
 
 
+def test_words_of_a_file_are_neither_markup_nor_commands_of_the_terminal(tmp_path: Path) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text('<robot name="a"><link name="[/red]\u009b31m[bold]\u202e"/><link name="b"/></robot>')
+    done = kinqp("describe", "--robot", path, "--formulation", "joint-space", "--mode", "line:z")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert "[/red] 31m[bold]" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", [("report",), ("worst-case", "--replay"), ("certify", "--replay"), ("sweep",)])
+def test_a_file_of_brackets_is_one_sentence(tmp_path: Path, command: tuple[str, ...]) -> None:
+    brackets = "[" * 100_000
+    (tmp_path / "manifest.json").write_text(brackets)
+    (tmp_path / "sweep.toml").write_text("a = " + brackets)
+    given = {"report": tmp_path, "sweep": tmp_path / "sweep.toml"}.get(command[0], tmp_path / "manifest.json")
+    done = kinqp(*command, given)
+    assert done.returncode == 2, done.stderr[-500:]
+    assert "Traceback" not in done.stderr
+
+
 def test_ctrl_c_keeps_the_cells_done(tmp_path: Path) -> None:
     path, out = tmp_path / "long.toml", tmp_path / "out"
     path.write_text(TINY.replace("repeats = 2", "repeats = 100000"))

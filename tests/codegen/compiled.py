@@ -46,7 +46,7 @@ Case = tuple[str, str, str]
 def code(robot: str, formulation: str, mode: str) -> StepCode:
     """Work out the code of a step under the prefix that `CompiledStep` gives it."""
     chosen = Everything() if formulation == Everything.name else get_formulation(formulation)
-    prefix = step_module.identifier(f"kinqp_{robot}_{chosen.name}")
+    prefix = step_module.prefix_of(robot, chosen.name)
     return step_code(arm(robot), chosen, [Mode.parse(mode)], prefix)
 
 

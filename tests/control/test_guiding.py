@@ -94,7 +94,7 @@ class TestBadInput:
             (START[:6], np.zeros(6), r"q: expected shape \(7,\), got \(6,\)"),
             (START, np.zeros(3), r"wrench: expected shape \(6,\), got \(3,\)"),
             (START, [0, np.nan, 0, 0, 0, 0], "wrench: expected finite numbers"),
-            (START, "pull", "wrench: expected 6 numbers, got 'pull'"),
+            (START, "pull", "wrench: expected real numbers, got entries of type <U4"),
         ],
     )
     def test_call(self, q, wrench, message):

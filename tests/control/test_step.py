@@ -197,7 +197,7 @@ def test_active_rows_are_named_with_their_side() -> None:
         (Q, np.zeros(6), r"v: expected shape \(3,\) for mode fix-orientation \(rows vx, vy, vz\), got shape \(6,\)"),
         (Q[:6], V, r"q: expected shape \(7,\) .* got shape \(6,\)"),
         (np.full(7, np.inf), V, "q: expected finite numbers"),
-        ("home", V, "q: expected shape"),
+        ("home", V, "q: expected real numbers"),
     ],
 )
 def test_bad_input_is_named_before_any_work(q: object, v: object, message: str) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
-from kinqp.robots import RobotError, load_robot
+from kinqp.robots import Robot, RobotError, load_robot
 from tests.robots.arms import example_urdf
 
 if TYPE_CHECKING:
@@ -111,7 +113,7 @@ def test_unreadable_file(tmp_path: Path) -> None:
         (_robot(_FIRST, _joint("cb", "c", "b")), r"expected one joint to carry link 'b', got 'ab' and 'cb'$"),
         (
             _robot(_FIRST, links="ab").replace('xyz="0 0 0.1"', 'xyz="one two"'),
-            r"test.urdf: expected a URDF file, got one that pinocchio rejects \(",
+            r"joint 'ab': expected xyz of its <origin> as three finite numbers of at most 1e\+06, got 'one two'$",
         ),
     ],
 )
@@ -265,11 +267,88 @@ def test_mimic_joint_on_the_chain(tmp_path: Path) -> None:
             _LIMIT + '<axis xyz="a b c"/>',
             r"axis of three numbers that are not all zero, got 'a b c'$",
         ),
+        ("revolute", _LIMIT + '<axis xyz=""/>', r"axis of three numbers that are not all zero, got ''$"),
+        ("revolute", _LIMIT + "<axis/>", r"expected the attribute xyz and no other in its <axis> element, got none; "),
+        ("prismatic", _LIMIT + '<axis xzy="0 0 1"/>', r"expected the attribute xyz and no other in .*, got 'xzy'; "),
+        ("revolute", _LIMIT + '<axis xyz="0 0 1" frame="a"/>', r"no other in .*, got 'xyz', 'frame'; "),
+        (
+            "revolute",
+            _LIMIT + '<axis xyz="0 0 1e-9"/>',
+            r"expected an axis of length 1 .* got '0 0 1e-9' of length 1e-09$",
+        ),
+        ("revolute", _LIMIT + '<axis xyz="0 0 -1e200"/>', r"got '0 0 -1e200' of length 1e\+200$"),
+        ("revolute", _LIMIT + '<axis xyz="1 nan 0"/>', r"axis of three numbers that are not all zero, got '1 nan 0'$"),
     ],
 )
 def test_missing_or_useless_limit(tmp_path: Path, kind: str, inside: str, message: str) -> None:
     with pytest.raises(RobotError, match="^joint 'bc': .*" + message):
         _load(tmp_path, _robot(_FIRST, _joint("bc", "b", "c", kind, inside), links="abc"))
+
+
+@pytest.mark.parametrize("kind", ["fixed", "revolute"])
+@pytest.mark.parametrize(
+    ("origin", "message"),
+    [
+        ('<origin xzy="0 0 1"/>', r"expected xyz and rpy in its <origin>, got 'xzy'; "),
+        ('<origin xyz="0 0 1" rqy="0 0 0"/>', r"expected xyz and rpy in its <origin>, got 'rqy'; "),
+        ('<origin xyz="0 0"/>', r"expected xyz of its <origin> as three finite numbers of at most 1e\+06, got '0 0'$"),
+        ('<origin xyz="0 0 1e7"/>', r"of at most 1e\+06, got '0 0 1e7'$"),
+        (
+            '<origin rpy="0 0 inf"/>',
+            r"expected rpy of its <origin> as three finite numbers of at most 1e\+06, got '0 0 inf'$",
+        ),
+    ],
+)
+def test_an_origin_that_would_be_taken_for_none(tmp_path: Path, kind: str, origin: str, message: str) -> None:
+    second = _SECOND.replace('<origin xyz="0 0 0.1" rpy="0 0 0"/>', origin).replace("revolute", kind)
+    with pytest.raises(RobotError, match="^joint 'bc': .*" + message):
+        _load(tmp_path, _robot(_FIRST, second, links="abc"))
+
+
+@pytest.mark.parametrize("axis", ["0 3e-3 -4e-3", "0 30 -40", "1 1 1", "0 0.6 -0.8001"])
+def test_an_axis_of_another_length_counts_as_its_direction(tmp_path: Path, axis: str) -> None:
+    def loaded(text: str) -> Robot:
+        return _load(
+            tmp_path, _robot(_FIRST, _joint("bc", "b", "c", "revolute", _LIMIT + f'<axis xyz="{text}"/>'), links="abc")
+        )
+
+    along = np.array([float(part) for part in axis.split()])
+    unit, given = loaded(" ".join(map(repr, (along / np.linalg.norm(along)).tolist()))), loaded(axis)
+    q = np.array([0.3, -0.4])
+    symbol = ca.SX.sym("q", 2)
+    symbolic = ca.Function("pose", [symbol], [given.symbolic(symbol).pose])
+    np.testing.assert_allclose(given.pose(q), unit.pose(q), rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(symbolic(q).full(), unit.pose(q), rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    "inertial", ['<mass value="1e999"/>', '<mass value="nan"/>', '<origin xyz="0 0 1e300"/><mass value="1"/>']
+)
+def test_masses_that_are_no_numbers(tmp_path: Path, inertial: str) -> None:
+    text = _robot(_FIRST, links="ab").replace('<mass value="1"/>', inertial)
+    try:
+        assert not _load(tmp_path, text).has_inertia
+    except RobotError as error:
+        assert re.match(r"joint 'ab': expected finite numbers for mass and inertia|.*pinocchio rejects", str(error))  # noqa: PT017
+
+
+def _long(joints: int, kind: str) -> str:
+    names = [f"l{i}" for i in range(joints + 1)]
+    links = "".join(f'<link name="{name}"/>' for name in names)
+    chain = [_joint(f"j{i}", names[i], names[i + 1], kind if i else "revolute") for i in range(joints)]
+    return f'<robot name="long">{links}{"".join(chain)}</robot>'
+
+
+@pytest.mark.parametrize("kind", ["fixed", "revolute"])
+def test_a_very_long_chain_is_refused_at_once(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(RobotError, match=r"expected at most 1000 links, got 20001; "):
+        _load(tmp_path, _long(20_000, kind))
+
+
+def test_a_long_chain_is_an_arm_or_none(tmp_path: Path) -> None:
+    assert _load(tmp_path, _long(999, "fixed")).nv == 1
+    with pytest.raises(RobotError, match=r"expected at most 100 moving joints between base and tip, got 101; "):
+        _load(tmp_path, _long(101, "revolute"))
 
 
 def test_limits_off_the_chain_are_not_asked_for(tmp_path: Path) -> None:

@@ -182,7 +182,7 @@ _BAD_VECTORS = [
     ([True] * 7, r"expected real numbers, got entries of type bool$"),
     (np.zeros(7, dtype=complex), r"expected real numbers, got entries of type complex128$"),
     (None, r"expected real numbers, got entries of type object$"),
-    ([[0.0], [0.0, 1.0]], r"expected 7 numbers, got \[\[0.0\], \[0.0, 1.0\]\] "),
+    ([[0.0], [0.0, 1.0]], r"expected real numbers, got \[\[0.0\], \[0.0, 1.0\]\] "),
 ]
 
 

@@ -59,7 +59,7 @@ def test_a_tool_on_a_tool() -> None:
         ("drill", (0.0, 0.0, 0.1), "", "expected a name that no frame"),
         ("drill", (0.0, 0.1), "end", r"expected shape \(3,\) or a homogeneous \(4, 4\), finite, got"),
         ("drill", (0.0, 0.0, np.nan), "end", "finite, got"),
-        ("drill", "long", "end", "finite, got 'long'"),
+        ("drill", "long", "end", "expected real numbers, got entries of type <U4"),
         ("drill", np.diag([1.0, 1.0, -1.0, 1.0]), "end", "finite with a rotation, got"),
         ("drill", np.diag([2.0, 1.0, 1.0, 1.0]), "end", "finite with a rotation, got"),
         ("drill", np.eye(4) + np.eye(4, k=-3), "end", "finite with a rotation, got"),

@@ -164,6 +164,80 @@ def test_cache_that_cannot_be_written_names_the_remedy(monkeypatch: pytest.Monke
         build_library("answer", SOURCES)
 
 
+def planted(library: Path) -> None:
+    """Put another library where this one would be, with a checksum, as who can write there can."""
+    other = build_library("other", {"other.c": "int answer(void); int answer(void) { return 666; }"})
+    library.unlink()
+    other.rename(library)
+
+
+def test_a_cache_that_others_may_write_to_is_refused(own_cache: Path) -> None:
+    planted(build_library("answer", SOURCES))
+    for mode in (0o777, 0o1777, 0o770, 0o707):
+        own_cache.chmod(mode)
+        with pytest.raises(
+            CompilerError, match=r"expected a folder of this user that no one else may write to, got .*KINQP_CACHE"
+        ):
+            build_library("answer", SOURCES)
+
+
+def test_a_cache_in_a_folder_that_anyone_may_rename_is_refused(own_cache: Path) -> None:
+    build_library("answer", SOURCES)
+    own_cache.parent.chmod(0o777)
+    with pytest.raises(
+        CompilerError, match="expected to be where no one else can replace it, but everyone may write to"
+    ):
+        build_library("answer", SOURCES)
+    own_cache.parent.chmod(0o1777)  # as /tmp: only the owner may rename what is in it
+    assert answer(build_library("answer", SOURCES)) == 42
+
+
+def test_a_cache_of_another_user_is_refused(own_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    build_library("answer", SOURCES)
+    if os.geteuid() == 0:
+        os.chown(own_cache, 12345, -1)
+    else:
+        monkeypatch.setattr("os.geteuid", lambda: 12345)
+    with pytest.raises(CompilerError, match=r"expected a folder of this user .* of user \d+ with mode 700"):
+        build_library("answer", SOURCES)
+
+
+def test_a_library_that_others_may_write_or_that_is_a_link_is_built_again(tmp_path: Path) -> None:
+    library = build_library("answer", SOURCES)
+    planted(library)
+    assert answer(library) == 666
+    library.chmod(0o775)
+    assert build_library("answer", SOURCES) == library
+    code = "import ctypes, sys; print(ctypes.CDLL(sys.argv[1]).answer())"
+    line = [sys.executable, "-c", code, str(library)]  # this process has the other one loaded
+    assert subprocess.run(line, capture_output=True, text=True, check=True).stdout.strip() == "42"
+    library.rename(tmp_path / "elsewhere.so")
+    library.symlink_to(tmp_path / "elsewhere.so")
+    assert not build_library("answer", SOURCES).is_symlink()
+
+
+def test_a_new_cache_is_ours_alone_whatever_the_umask(own_cache: Path) -> None:
+    before = os.umask(0)
+    try:
+        library = build_library("answer", SOURCES)
+    finally:
+        os.umask(before)
+    assert not (own_cache.stat().st_mode | library.stat().st_mode) & 0o022
+    assert build_library("answer", SOURCES) == library
+
+
+def test_what_killed_builds_left_is_removed(own_cache: Path) -> None:
+    build_library("other", {"other.c": "int other;"})
+    old, new, foreign = (own_cache / name for name in (".kinqp-build-a", ".kinqp-build-b", ".another"))
+    for folder in (old, new, foreign):
+        folder.mkdir()
+        (folder / "step.c").touch()
+    for folder in (old, foreign):
+        os.utime(folder, (0.0, 0.0))
+    build_library("answer", SOURCES)
+    assert (old.exists(), new.exists(), foreign.exists()) == (False, True, True)
+
+
 def test_where_the_cache_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv("KINQP_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
