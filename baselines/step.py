@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from ..formulations import Kept, StepResult, one_by_one
+from ..formulations import CommandCheck, StepResult, one_by_one
 from ..solvers import Status
 from .situation import Observer
 
@@ -114,7 +114,7 @@ class BaselineStep:
     def _judge(self, at: Situation, resolved: Resolved, time: float) -> StepResult:
         qd = resolved.qd
         finite = bool(np.isfinite(qd).all())
-        kept = Kept.of(qd, at.J_fixed, at.v_fixed, at.qd_lo, at.qd_hi)
+        kept = CommandCheck.of(qd, at.J_fixed, at.v_fixed, at.qd_lo, at.qd_hi)
         found: dict[Promise, str] = {"joint bounds": kept.joint_bounds, "locked rows": kept.locked_rows}
         off = {promise: text for promise, text in found.items() if text}
         broken = [text for promise, text in off.items() if promise in self.baseline.promises]

@@ -58,8 +58,6 @@ def compile_step(
     made = get_formulation(formulation)
     if solver == qrqp.NAME and isinstance(made, Hierarchy):
         raise ValueError(f"solver: expected {SOLVER} for {made.name}, which is several QPs in order, got {solver!r}")
-    if solver == qrqp.NAME and made.safe_stop != "zero":
-        raise ValueError(f"solver: expected {SOLVER} for {made.name}, whose safe stop is braking, got {solver!r}")
     return CompiledStep(
         robot,
         made,

@@ -126,7 +126,7 @@ def export_c(
         shared
         | {
             "formulation": code.formulation,
-            "brake": bool(code.brake_body),
+            "brake": code.brakes,
             "robot": code.robot,
             "version": library_version(),
             "ticks": len(recorded.mode),

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final
 import casadi as ca
 
 from .emit import emit, number
+from .kernels import pack, places
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -69,6 +70,10 @@ class Field:
         Whether it is an array even with one entry.
     defaults : tuple of str
         C literals, one per entry.
+    least, most : str
+        C literals of the range that is accepted.
+    range : str
+        The same in words.
     """
 
     name: str
@@ -76,6 +81,9 @@ class Field:
     size: int
     array: bool
     defaults: tuple[str, ...]
+    least: str
+    most: str
+    range: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +144,9 @@ def field_of(given: Input) -> Field:
     default = given.default if given.default is not None else [0.0] * given.size
     comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')} [{given.unit}]"
     array = given.size > 1 or given.name in _ARRAYS
-    return Field(given.name, comment, given.size, array, tuple(number(float(x)) for x in default))
+    least, most = map(number, given.range)
+    defaults = tuple(number(float(x)) for x in default)
+    return Field(given.name, comment, given.size, array, defaults, least, most, given.describe_range())
 
 
 def sources_of(fields: Mapping[str, Field]) -> dict[str, str]:
@@ -176,6 +186,8 @@ def _numbered(mode: Mode) -> str:
 
 
 def row_statements(tick: Tick) -> tuple[str, ...]:
-    """Return statements that fill `rows` with the rows of the twist: J free, then J fixed, row by row."""
-    rows = ca.Function("rows", [tick.q], [ca.densify(ca.vertcat(tick.J_free, tick.J_fixed).T)])
-    return tuple(emit(rows, ["q"], ["rows"], {f"q[{i}]": f"[{i}]" for i in range(tick.nv)}))
+    """Return statements that fill `rows` with the rows of the twist, padded: J free, then J fixed."""
+    value = ca.densify(ca.vertcat(tick.J_free, tick.J_fixed))
+    rows = ca.Function("rows", [tick.q], [value])
+    angles = {f"q[{i}]": f"[{i}]" for i in range(tick.nv)}
+    return tuple(pack(emit(rows, ["q"], [places(value.shape, "rows", "rows")], angles), ["rows"]))

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 
 from .emit import Call
+from .shape import identical
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -80,7 +81,12 @@ class Staged:
     calls: tuple[Call, ...]
 
 
-def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: int) -> Staged:
+def stage(
+    cuts: Sequence[Cut],
+    given: Mapping[str, tuple[ca.SX, str]],
+    first: int,
+    written: Mapping[str, tuple[ca.SX, Layout]],
+) -> Staged:
     """Lay out the arrays of cuts and write their calls.
 
     Parameters
@@ -91,6 +97,8 @@ def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: in
         Run-time inputs by name: symbol, and C expression of its array. A kernel reads them where they are.
     first : int
         Position of the first cut's first symbol among the arguments of the function that is emitted.
+    written : mapping of str to (ca.SX, Layout)
+        Outputs that no cut takes part in, by the name of their array: a kernel reads them there, too.
     """
     places: dict[str, tuple[str, Layout]] = {}  # a symbol's or input's array and its layout, by the name of its entries
     for symbol, expression in given.values():
@@ -114,6 +122,10 @@ def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: in
             if known is not None and layout in (known[1], "number"):
                 arguments.append(f"{known[0]}[0]" if layout == "number" else known[0])
                 continue
+            same = next((n for n, (w, way) in written.items() if way == layout and identical(w, value)), None)
+            if same is not None:
+                arguments.append(same)
+                continue
             name = f"k{index}_{k}"
             shape, entries = _layout(value.shape, "plain" if layout == "number" else layout, name)
             declarations.append(f"double {name}[{shape}];")
@@ -131,9 +143,9 @@ def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: in
             arguments.append(name)
         fills = tuple(range(position, position + len(cut.symbols)))
         position += len(cut.symbols)
-        written = tuple(arguments[-len(cut.symbols) :])
+        results = tuple(arguments[-len(cut.symbols) :])
         only_inputs = len(outputs) == before and all(_label(value) in inputs for value in cut.inputs)
-        made = Call(f"kinqp_{cut.kernel}({', '.join(arguments)});", () if only_inputs else fills, written)
+        made = Call(f"kinqp_{cut.kernel}({', '.join(arguments)});", () if only_inputs else fills, results)
         (at_once if only_inputs else calls).append(made)
     return Staged(
         tuple(declarations),
@@ -144,11 +156,6 @@ def stage(cuts: Sequence[Cut], given: Mapping[str, tuple[ca.SX, str]], first: in
         tuple(at_once),
         tuple(calls),
     )
-
-
-def locked_array(cuts: Sequence[Cut]) -> str:
-    """Name of the array, as `stage` lays it out, that has the locked rows, padded; empty if no kernel takes them."""
-    return next((f"k{index}_1" for index, cut in enumerate(cuts) if cut.kernel == "locked_rows"), "")
 
 
 def used(cuts: Sequence[Cut], values: Sequence[ca.SX]) -> list[Cut]:

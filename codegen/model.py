@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Final
 
 import casadi as ca
 
-from ..formulations import Hierarchy, levels_of, lower
+from ..formulations import Hierarchy, Tick, levels_of, lower
 from .cascade import cascade_code
 from .definite import require_definite
 from .emit import emit, needed_for
 from .fields import C_NAMES, SIGNALS, ModeText, field_of, mode_symbols, row_statements, sources_of
-from .kernels import KERNELS, agree, locked_array, pack, padded, places, room, stage, used
+from .kernels import KERNELS, agree, pack, padded, places, room, stage, used
 from .reduction import Reduced, reduce
 from .shape import Shape, identical
 
@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from .kernels import Layout
 
 # Rows of these are padded, for loops over four columns at a time.
-_PADDED: Final = (C_NAMES["A"], C_NAMES["J"])
+# What the caller has room for: guided and locked rows of the Jacobian.
+_OF_CALLER: Final = (C_NAMES["J"], "locked")
+_PADDED: Final = (C_NAMES["A"], *_OF_CALLER)
 _PADDED_IF_DIAGONAL: Final = ("lower", "upper", "k")
 # These are needed only where a row is active.
 _LATE: Final = (C_NAMES["C"], "start")
@@ -36,8 +38,7 @@ class ModeCode(ModeText):
     """One motion mode of a formulation of one QP.
 
     `body` is what every tick computes, `late_body` what is needed only where the minimiser without rows is outside of
-    some, `start_body` what is needed of that only to keep to admissible points. `locked` is the array of the locked
-    rows that a command is judged by, empty where it keeps them by equalities, or by what goes with the hand alone.
+    some, `start_body` what is needed of that only to keep to admissible points.
     """
 
     n: int
@@ -51,7 +52,6 @@ class ModeCode(ModeText):
     late_body: tuple[str, ...]
     start_body: tuple[str, ...]
     kernels: tuple[str, ...]
-    locked: str
 
     @property
     def size(self) -> str:
@@ -108,7 +108,13 @@ class StepCode:
     modes : tuple of ModeText
         All `ModeCode`, or, of a hierarchy, all `CascadeCode`.
     brake_body : tuple of str
-        Statements of the safe stop by braking; empty where the safe stop is zero velocity.
+        Statements of the braking that a safe stop is where the last command is known.
+    brakes : bool
+        Whether a step is told the last command.
+    sampled : bool
+        Whether joint velocity bounds are exact in sampled time; otherwise they are those of the thesis.
+    limits_acceleration : bool
+        Whether the formulation promises to keep acceleration limits.
     """
 
     prefix: str
@@ -123,6 +129,9 @@ class StepCode:
     inputs: tuple[Field, ...]
     modes: tuple[ModeText, ...]
     brake_body: tuple[str, ...]
+    brakes: bool
+    sampled: bool
+    limits_acceleration: bool
 
     @property
     def single(self) -> tuple[ModeCode, ...]:
@@ -167,7 +176,10 @@ def step_code(robot: Robot, formulation: Formulation, modes: Sequence[Mode], pre
         parameters=tuple(field_of(given) for name, given in largest.items() if name not in SIGNALS),
         inputs=tuple(field_of(given) for name, given in largest.items() if name in SIGNALS),
         modes=codes,
-        brake_body=_brake_body(lower(last, robot, modes[0])) if last.safe_stop == "braking" else (),
+        brake_body=_brake_body(Tick(robot, modes[0])),
+        brakes="qd_prev" in largest,
+        sampled=last.bounds == "viable",
+        limits_acceleration=last.limits_acceleration,
     )
 
 
@@ -179,7 +191,9 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode, symbol: str) 
     shape = Shape.of(reduced)
     outputs = _outputs(lowered, reduced, shape)
     cuts = used(tick.cuts, list(outputs.values()))
-    staged = stage(cuts, {given.name: (given.symbol, sources[given.name]) for given in inputs}, len(inputs))
+    of_caller: dict[str, tuple[ca.SX, Layout]] = {n: (outputs[n], "rows") for n in _OF_CALLER if n in outputs}
+    known = {given.name: (given.symbol, sources[given.name]) for given in inputs}
+    staged = stage(cuts, known, len(inputs), of_caller)
     function = ca.Function(
         "data",
         [*(given.symbol for given in inputs), *(symbol for cut in cuts for symbol in cut.symbols)],
@@ -211,7 +225,7 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode, symbol: str) 
         arrays=tuple(
             f"{name}[{max(1, room(value.shape, layouts[name]))}]"
             for name, value in outputs.items()
-            if name not in aliases
+            if name not in aliases and name not in _OF_CALLER
         ),
         aliases=aliases,
         declarations=staged.declarations,
@@ -220,18 +234,18 @@ def _mode_code(formulation: Formulation, robot: Robot, mode: Mode, symbol: str) 
         start_body=tuple(third),
         row_body=row_statements(tick),
         kernels=tuple(dict.fromkeys(cut.kernel for cut in cuts)),
-        locked="" if reduced.m_eq or shape.diagonal else locked_array(cuts),
         finite=tuple(field for name, field in fields.items() if name in SIGNALS and field.size),
         rows=reduced.rows,
         inputs=inputs,
     )
 
 
-def _brake_body(lowered: Lowered) -> tuple[str, ...]:
-    brake = ca.densify(lowered.tick.qd_brake)
-    function = ca.Function("brake", [given.symbol for given in lowered.inputs], [brake])
-    sources = sources_of({given.name: field_of(given) for given in lowered.inputs})
-    return tuple(emit(function, list(sources.values()), ["qd"]))
+def _brake_body(tick: Tick) -> tuple[str, ...]:
+    brake = ca.densify(tick.qd_brake)
+    # Arguments of the C function: the last command by its place in it, the period by value.
+    sources = {given.name: given.name for given in tick.inputs} | {"qd_prev": "last", "dt": "(&dt)"}
+    function = ca.Function("brake", [given.symbol for given in tick.inputs], [brake])
+    return tuple(emit(function, [sources[given.name] for given in tick.inputs], ["qd"]))
 
 
 def _lower_for_c(formulation: Formulation, robot: Robot, mode: Mode) -> tuple[Lowered, Reduced]:
@@ -251,6 +265,8 @@ def _outputs(lowered: Lowered, reduced: Reduced, shape: Shape) -> dict[str, ca.S
         outputs |= {C_NAMES["A"]: reduced.A, "b": reduced.b}
     # Bounds and offset as rows, where they are padded.
     outputs |= {"lower": reduced.lower.T, "upper": reduced.upper.T, C_NAMES["J"]: lowered.tick.J_free}
+    if lowered.tick.m_fixed:
+        outputs["locked"] = lowered.tick.J_fixed
     if not shape.direct_rows:
         outputs[C_NAMES["C"]] = reduced.C
     if not shape.direct_command:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import casadi as ca
 
 from ..formulations import DATA, lower
-from .render import environment, render_step
+from .render import environment, render_step, step_values
 
 if TYPE_CHECKING:
     from ..formulations import Formulation, Lowered, Mode
@@ -43,21 +44,14 @@ def render_qrqp(code: StepCode, formulation: Formulation, robot: Robot, mode: Mo
         ("in" if given.name in fields else "p", given.name, _is_array(code, given.name)) if given.size else None
         for given in lowered.inputs
     ]
-    text = (
-        environment()
-        .get_template("qrqp.c.j2")
-        .render(
-            p=code.prefix,
-            mode=code.modes[0],
-            nv=code.nv,
-            m_free=code.m_free,
-            rows=code.rows,
-            fields=code.parameters,
-            arguments=arguments,
-            sizes={"arg": tick.sz_arg(), "res": tick.sz_res(), "iw": tick.sz_iw(), "w": tick.sz_w()},
-            tolerance=_TOLERANCE,
-        )
-    )
+    # CasADi's solver is not one of ours, but what leaves the tick is looked at all the same.
+    values = step_values(replace(code, max_iterations=200)) | {
+        "arguments": arguments,
+        "sizes": {"arg": tick.sz_arg(), "res": tick.sz_res(), "iw": tick.sz_iw(), "w": tick.sz_w()},
+        "tolerance": _TOLERANCE,
+        "needs_rows": True,
+    }
+    text = environment().get_template("qrqp.c.j2").render(values)
     header = f"{code.prefix}.h"
     return {header: render_step(code)[header], f"{code.prefix}.c": text, "qrqp.c": generator.dump()}
 

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import jinja2
 
+from ..formulations import BOUND_TOLERANCE, FIXED_TOLERANCE
 from ..solvers.active_set import embedded_source, fixed_size_sources
+from .emit import number
 from .fields import C_NAMES, MEMORY
 from .kernels import padded
 
@@ -52,13 +54,25 @@ def render_step(code: StepCode) -> dict[str, str]:
         File name to content: ``<prefix>.h`` and ``<prefix>.c``, which need nothing but the C library.
     """
     sources = fixed_size_sources()
-    header = sources["kinqp_status.h"]
-    values: dict[str, Any] = {
+    values = step_values(code)
+    values |= _of_one_qp(code, sources) if code.single else {"solver_source": general_solver()}
+    source = "step.c.j2" if code.single else "cascade.c.j2"
+    templates = environment()
+    return {
+        f"{code.prefix}.h": templates.get_template("step.h.j2").render(values),
+        f"{code.prefix}.c": templates.get_template(source).render(values),
+    }
+
+
+def step_values(code: StepCode) -> dict[str, Any]:
+    """What header, gate and the function around all modes are filled with, whatever solves the QP."""
+    blends = len(code.modes) > 1
+    return {
         "p": code.prefix,
         "title": f"{code.formulation} on {code.robot}: {', '.join(mode.text for mode in code.modes)}",
         "summary": "One control cycle of a hand-guided arm: joint positions and hand velocity in, joint rates out.",
         "version": library_version(),
-        "status_header": header,
+        "status_header": fixed_size_sources()["kinqp_status.h"],
         "math_header": math_header(),
         "modes": code.modes,
         "parameters": code.parameters,
@@ -69,18 +83,16 @@ def render_step(code: StepCode) -> dict[str, str]:
         "drift": any(field.name == "v_fixed" and field.size for field in code.inputs),
         "rows": code.rows,
         "max_iterations": code.max_iterations,
+        "safe_stop": "braking" if code.brakes else "zero",
         "brake": code.brake_body,
-        # Equalities are kept by the solver; what a pseudo-inverse leaves in the locked rows grows with the hand. Where
-        # a mode has these rows at hand its tick looks at them itself.
-        "checked": [mode for mode in code.single if mode.m_fixed and not mode.m_eq and not mode.locked],
-        "safe_stop": "the fastest admissible braking" if code.brake_body else "zero",
-    }
-    values |= _of_one_qp(code, sources) if code.single else {"solver_source": general_solver()}
-    source = "step.c.j2" if code.single else "cascade.c.j2"
-    templates = environment()
-    return {
-        f"{code.prefix}.h": templates.get_template("step.h.j2").render(values),
-        f"{code.prefix}.c": templates.get_template(source).render(values),
+        "brakes": code.brakes,
+        "blends": blends,
+        "needs_rows": blends or code.brakes or not code.single,
+        "sampled": int(code.sampled),
+        "limits_acceleration": code.limits_acceleration,
+        "bound_tolerance": number(BOUND_TOLERANCE),
+        "fixed_tolerance": number(FIXED_TOLERANCE),
+        "joint_stride": padded(code.nv),
     }
 
 
@@ -93,7 +105,6 @@ def _of_one_qp(code: StepCode, sources: dict[str, str]) -> dict[str, Any]:
         "largest": max(n for n, _ in code.sizes),
         "most_equalities": max(1, *(mode.m_eq for mode in code.single)),
         "kernels": _kernels(code),
-        "joint_stride": padded(code.nv),
         "row_stride": padded(code.rows),
     }
 

@@ -121,6 +121,11 @@ class CompiledStep:
         self._no_sides.flags.writeable = False
 
     @property
+    def feasible(self) -> bool:
+        """Whether a tick that reaches `max_iterations` still gives a usable command."""
+        return bool(self._parameters.feasible)
+
+    @property
     def specs(self) -> tuple[Input, ...]:
         """What a call takes: `q`, `v` and the run-time inputs, with their sizes, defaults and ranges."""
         return tuple(self._specs.values())

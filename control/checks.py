@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..formulations import InputError, Mode
+from ..formulations import LONGEST_DT, SHORTEST_DT, InputError, Mode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def checked_array(name: str, given: ArrayLike, size: int) -> Array:
-    """Return `given` as an array of shape (size,), finite.
+def checked_array(name: str, given: ArrayLike, size: int, *, finite: bool = True) -> Array:
+    """Return `given` as an array of shape (size,), finite unless told that it need not be.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def checked_array(name: str, given: ArrayLike, size: int) -> Array:
         raise InputError(f"{name}: expected {size} numbers, got {given!r}") from None
     if values.shape != (size,):
         raise InputError(f"{name}: expected shape ({size},), got {values.shape}")
-    if not np.isfinite(values).all():
+    if finite and not np.isfinite(values).all():
         raise InputError(f"{name}: expected finite numbers, got {values}")
     return values
 
@@ -60,6 +60,6 @@ def checked_period(dt: float) -> float:
     ValueError
         When it is none.
     """
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+    if not SHORTEST_DT <= dt <= LONGEST_DT:
+        raise ValueError(f"dt: expected {SHORTEST_DT:g} to {LONGEST_DT:g} s, got {dt}")
     return float(dt)

@@ -184,11 +184,11 @@ class CompiledGuiding:
 
     def __call__(self, q: ArrayLike, wrench: ArrayLike) -> GuidingResult:
         """As `GuidingController.__call__`."""
-        self._q[:] = checked_array("q", q, self.robot.nv)
-        self._wrench[:] = checked_array("wrench", wrench, 6)
+        self._q[:] = checked_array("q", q, self.robot.nv, finite=False)
+        self._wrench[:] = checked_array("wrench", wrench, 6, finite=False)
         code = self._tick(self._parameters, self._state, self._input, self._output)
         output = self._output
-        mode = self.modes[output.mode]
+        mode = self.modes[max(output.mode, 0)]
         results = self._results
         return GuidingResult(
             results["qd"].copy(),
@@ -196,11 +196,12 @@ class CompiledGuiding:
             results["v_actual"][: mode.m_free].copy(),
             Status.SOLVED if code == 0 else STATUSES[code],
             output.iterations,
-            self._active(output.mode) if output.iterations else (),
+            self._active(max(output.mode, 0)) if output.iterations else (),
             mode,
             _PHASES[output.phase],
             results["drift"].copy(),
             bool(output.yielded),
+            output.held,
         )
 
     def _active(self, mode: int) -> tuple[str, ...]:

@@ -34,8 +34,9 @@ class GuidingController:
     - Joint velocity limits may be changed at any time: they take effect no faster than the acceleration limits let a
       joint follow.
     - Joint positions can be those of an observer (`observer_gain`), which keeps the encoders' noise out.
-    - A tick whose QP is not solved sends the safe stop, and the hand's velocity begins again at zero; after
-      `max_failures` in a row the controller stops, and says why in `reason`.
+    - A tick whose QP is not solved sends the safe stop: braking from the last command, as fast as the acceleration
+      limits allow and no faster. So does one whose sample (`q`, wrench) is not finite, after `hold_ticks` for which the
+      last one is held. After `max_failures` of both in a row the controller stops, and says why in `reason`.
 
     Not to be shared between threads. `make_guiding` makes one.
 
@@ -105,6 +106,8 @@ class GuidingController:
         self._v: Array = np.zeros(self._unit.mode.m_free)
         self._anchor: Array | None = None
         self._position: Array | None = None
+        self._wrench: Array = np.zeros(6)
+        self._held = 0
 
     def engage(self, mode: str | Mode) -> None:
         """Ask for a mode: the tool is brought to rest, then anchored; the same mode again anchors it anew.
@@ -195,30 +198,43 @@ class GuidingController:
         Raises
         ------
         InputError
-            Naming the one that has the wrong shape or is not finite.
+            Naming the one that has the wrong shape or no numbers. A sample that is not finite is lost, and no error.
         """
-        measured = checked_array("q", q, self.robot.nv)
-        pull = checked_array("wrench", wrench, 6)
-        position = self._unit.observe(measured, measured if self._position is None else self._position, self._qd)
-        self._position = position
+        measured = checked_array("q", q, self.robot.nv, finite=False)
+        pull = checked_array("wrench", wrench, 6, finite=False)
+        sampled, position = self._sample(measured, pull)
+        if not sampled:
+            self._count_failure("no sample that is finite")
+        if self._held > self.settings.hold_ticks or (not sampled and self._anchor is None):
+            return self._brake(position, Status.FAILED)
         if self._anchor is None:
-            self._anchor = self._unit.anchor_at(position)
+            anchor = self._unit.anchor_at(position)
+            if not np.isfinite(anchor).all():
+                self._count_failure("no pose that is finite")
+                return self._brake(position, Status.FAILED)
+            self._anchor = anchor
         if self._phase is not GuidingPhase.GUIDING and not self._v.any():
-            return self._come_to_rest(position, pull)
+            return self._come_to_rest(position)
         stopping = self._phase is GuidingPhase.STOPPING
-        asked = self._unit.ask(position, pull, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
+        asked = self._unit.ask(position, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
+        if not all(np.isfinite(values).all() for values in asked):
+            if sampled:
+                self._count_failure("no finite answer of the law")
+            return self._brake(position, Status.FAILED)
         self._limit = asked.qd_limit
         tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._qd, self._qdd)
         # Limits that leave no way back to the anchor must not keep the hand from moving.
         yielded = tick.status is not Status.SOLVED and bool(asked.v_fixed.any())
         if yielded:
             tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._qd, self._qdd)
+        if tick.status is not Status.SOLVED and sampled:
+            self._count_failure(tick.status.value)
+        if not self._unit.usable(tick.status):
+            stopped = self._brake(position, tick.status)
+            return stopped._replace(v=asked.v, iterations=tick.iterations, drift=asked.drift, yielded=yielded)
         self._v = asked.v
-        self._failures = 0 if tick.status is Status.SOLVED else self._failures + 1
-        if self._failures:
-            self._v = np.zeros_like(asked.v)
-        if self._failures == self.settings.max_failures:
-            self.stop(f"{self._failures} ticks in a row were not solved, the last one: {tick.status.value}")
+        if tick.status is Status.SOLVED and sampled:
+            self._failures = 0
         self._remember(tick.qd)
         return GuidingResult(
             tick.qd,
@@ -231,14 +247,59 @@ class GuidingController:
             self._phase,
             asked.drift,
             yielded,
+            self._held,
         )
 
-    def _come_to_rest(self, q: Array, pull: Array) -> GuidingResult:
+    def _sample(self, measured: Array, pull: Array) -> tuple[bool, Array]:
+        """Whether the sample can be used, and the joint positions of this tick.
+
+        One that is not finite is held: the wrench as it was, the arm where the last command has taken it.
+        """
+        usable = bool(np.isfinite(measured).all() and np.isfinite(pull).all())
+        last = self._position
+        if usable:
+            position = self._unit.observe(measured, measured if last is None else last, self._qd)
+            usable = bool(np.isfinite(position).all())
+        if usable:
+            self._held, self._wrench = 0, pull
+        else:
+            position = (np.zeros(self.robot.nv) if last is None else last) + self.dt * self._qd
+            self._held = min(self._held, self.settings.hold_ticks) + 1
+        if usable or last is not None:
+            self._position = position
+        return usable, position
+
+    def _count_failure(self, reason: str) -> None:
+        self._failures += 1
+        if self._failures == self.settings.max_failures:
+            self.stop(f"{self._failures} ticks in a row were not solved, the last one: {reason}")
+
+    def _brake(self, q: Array, status: Status) -> GuidingResult:
+        """The safe stop; the hand goes on from what it leaves of the motion."""
+        self._brake_from_last(q)
+        left = self._unit.guided_velocity(q, self._qd)
+        self._v = left if np.isfinite(left).all() else np.zeros_like(left)
+        nothing = np.zeros_like(left)
+        return GuidingResult(
+            self._qd,
+            nothing,
+            self._v,
+            status,
+            0,
+            (),
+            self.mode,
+            self._phase,
+            np.zeros(2),
+            yielded=False,
+            held=self._held,
+        )
+
+    def _come_to_rest(self, q: Array) -> GuidingResult:
         """Bring what still moves to rest, then do what was asked for: nothing is asked of the tool any more."""
         assert self._anchor is not None, "anchored at the first tick"  # noqa: S101  # for mypy
-        asked = self._unit.ask(q, pull, self._v, self._anchor, self._qd, self._limit, stopping=True)
+        asked = self._unit.ask(q, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=True)
         self._limit = asked.qd_limit
-        self._remember(self._unit.brake(q, self._qd, self._limit))
+        self._brake_from_last(q)
         done = self._unit
         if not self._qd.any():
             if self._stop_asked:
@@ -252,8 +313,23 @@ class GuidingController:
         zero = np.zeros(done.mode.m_free)
         actual = zero if not self._qd.any() else done.guided_velocity(q, self._qd)
         return GuidingResult(
-            self._qd, zero, actual, Status.SOLVED, 0, (), done.mode, self._phase, asked.drift, yielded=False
+            self._qd,
+            zero,
+            actual,
+            Status.SOLVED,
+            0,
+            (),
+            done.mode,
+            self._phase,
+            asked.drift,
+            yielded=False,
+            held=self._held,
         )
+
+    def _brake_from_last(self, q: Array) -> None:
+        self._qd = self._unit.brake(q, self._qd, self._limit)
+        # The acceleration of a stop is not one to go on with: the arm would be carried past its rest.
+        self._qdd = np.zeros_like(self._qd)
 
     def _remember(self, qd: Array) -> None:
         self._qdd = (qd - self._qd) / self.dt

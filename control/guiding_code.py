@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import casadi as ca
 
 from ..codegen.emit import emit, number
 from ..codegen.fields import Field, field_of, mode_symbols
-from ..codegen.render import environment, library_version, math_header
+from ..codegen.render import environment, step_values
 from .guiding_law import HANDED, GuidingLaw
 
 if TYPE_CHECKING:
@@ -85,24 +85,17 @@ def render_guiding(
     # Limits are the step's; what only the law has is a setting.
     fields = {given.name: _setting(given) for given in laws[0].settable if given.name not in own}
     sources = _sources(laws[0].inputs, fields, code)
-    values = {
-        "p": code.prefix,
+    values = step_values(code) | {
         "title": f"{code.formulation} on {code.robot}, guided by hand: {', '.join(map(str, modes))}",
-        "version": library_version(),
-        "math_header": math_header(),
-        "nv": code.nv,
-        "m_free": code.m_free,
-        "m_fixed": code.m_fixed,
-        "rows": code.rows,
         "settings": list(fields.values()),
+        "first_setting": len(code.parameters) + 3,
         "max_failures": settings.max_failures,
+        "hold_ticks": settings.hold_ticks,
         "dt": None if dt is None else number(dt),
-        "drift": any(field.name == "v_fixed" for field in code.inputs),
         "previous": any(field.name == "qd_prev" for field in code.inputs),
         "change": "qdd_prev" in own,
         "observe": _statements(laws[0], laws[0].observed, sources | {"q": "q"}),
         "anchor": _statements(laws[0], laws[0].anchor, sources | {"q": "q"}),
-        "brake": _statements(laws[0], laws[0].brake, sources | {"q": "q"}),
         "modes": [
             ModeLaw(
                 str(law.mode),
@@ -123,7 +116,7 @@ def render_guiding(
 
 def _setting(given: Input) -> Field:
     field = field_of(given)
-    return Field(field.name, f"{_COMMENTS[given.name]} [{given.unit}]", field.size, field.array, field.defaults)
+    return replace(field, comment=f"{_COMMENTS[given.name]} [{given.unit}]")
 
 
 def _sources(inputs: Sequence[Input], settings: dict[str, Field], code: StepCode) -> dict[str, str]:

@@ -51,7 +51,7 @@ class GuidingLaw:
     guided : dict of str to ca.SX
         `v`, (m_free, 1): velocity that `qd_prev` gives along the guided rows.
     brake : dict of str to ca.SX
-        `qd`, (nv, 1): the fastest admissible braking from `qd_prev`.
+        `qd`, (nv, 1): braking from `qd_prev`, as fast as the acceleration limits allow, within `qd_limit`.
     """
 
     def __init__(self, robot: Robot, mode: Mode, settings: GuidingSettings) -> None:
@@ -65,9 +65,12 @@ class GuidingLaw:
         self.law: Final = self._declare()
         self.observed: Final = {"observed": self._observe()}
         self.anchor: Final = {"anchor": ca.vec(tick.pose[:3, :])}
-        bounds = velocity_bounds("viable", tick.q, tick.q_min, tick.q_max, self._qd_limit, tick.qdd_max, tick.dt)
         self.guided: Final = {"v": tick.J_free @ tick.qd_prev}
-        self.brake: Final = {"qd": braking(tick.qd_prev, *bounds, tick.qdd_max, tick.dt)}
+        # The last command counts as it was sent, also where velocity limits are on their way below it.
+        last = tick.parameter("qd_limit", None, size=tick.nv, unit="rad/s or m/s")
+        limits = (ca.fmax(last, ca.fabs(tick.qd_prev)), tick.qdd_max, tick.dt)
+        bounds = velocity_bounds("viable", tick.q, tick.q_min, tick.q_max, *limits)
+        self.brake: Final = {"qd": braking(tick.qd_prev, *bounds, *limits)}
 
     @property
     def inputs(self) -> tuple[Input, ...]:

@@ -48,6 +48,8 @@ class GuidingResult(NamedTuple):
         Distance and angle of the locked rows from where the mode was engaged, before the command [m, rad].
     yielded : bool
         Whether the drift compensation gave way, because limits could not follow it.
+    held : int
+        Ticks in a row, this one included, whose sample was not finite: up to `hold_ticks` the last one stands for it.
     """
 
     qd: Array
@@ -60,3 +62,4 @@ class GuidingResult(NamedTuple):
     phase: GuidingPhase
     drift: Array
     yielded: bool
+    held: int = 0

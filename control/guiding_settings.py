@@ -44,7 +44,10 @@ class GuidingSettings:
         Of the observer of joint positions (`PositionObserver`): what a measurement counts for, above 0 [-]; with 1 or
         more there is no observer. A measurement further than this from what is expected is believed at once [rad or m].
     max_failures : int
-        So many ticks in a row whose QP is not solved end in a stop.
+        So many ticks in a row whose QP is not solved, or that have no usable sample, end in a stop.
+    hold_ticks : int
+        So many ticks in a row a sample (`q`, wrench) that is not finite is replaced by the last wrench and by where the
+        last command has taken the arm. After that the arm brakes until there is one.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class GuidingSettings:
     observer_gain: float = 1.0
     observer_jump: float = JUMP
     max_failures: int = 20
+    hold_ticks: int = 5
 
     def __post_init__(self) -> None:
         for name in ("admittance_mass", "admittance_damping"):
@@ -80,8 +84,10 @@ class GuidingSettings:
         for name in _NOT_NEGATIVE:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(f"{name}: expected a number that is not negative, got {getattr(self, name)!r}")
-        if isinstance(self.max_failures, bool) or self.max_failures != int(self.max_failures) or self.max_failures < 1:
-            raise ValueError(f"max_failures: expected a count of at least 1, got {self.max_failures!r}")
+        for name, least in (("max_failures", 1), ("hold_ticks", 0)):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not np.isfinite(count) or count != int(count) or count < least:
+                raise ValueError(f"{name}: expected a count of at least {least}, got {count!r}")
 
 
 _POSITIVE = (

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..formulations import InputError
 from ..formulations.buffered import BufferedFunction
+from ..solvers import Status
 from .guiding_law import GuidingLaw
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class GuidingUnit:
         self._values: Final = {given.name: given.default for given in law.settable if given.default is not None}
         for name, default in {**self._values, "dt": np.array([dt])}.items():
             self._put(name, default)
+        # A compiled step that keeps to admissible points has a command to send also where it is capped.
+        self._feasible: Final = bool(getattr(step, "feasible", False))
         self._remembers: Final = "qd_prev" in step.inputs
         self._remembers_change: Final = "qdd_prev" in step.inputs
         self._specs: Final = {spec.name: spec for spec in (*law.settable, *step.specs) if spec.name not in _GIVEN}
@@ -148,6 +151,10 @@ class GuidingUnit:
         if self._remembers_change:
             inputs["qdd_prev"] = qdd_prev
         return self._step(q, v, **inputs)
+
+    def usable(self, status: Status) -> bool:
+        """Whether a command of the step with this status is to be sent; otherwise it is the safe stop."""
+        return status is Status.SOLVED or (self._feasible and status is Status.MAX_ITERATIONS)
 
     def brake(self, q: Array, qd_prev: Array, qd_limit: Array) -> Array:
         """Fastest admissible braking, shape (nv,)."""

@@ -10,15 +10,16 @@ import numpy as np
 from ..baselines import Baseline, BaselineStep, get_baseline, is_baseline
 from ..formulations import (
     ABOVE,
+    CommandCheck,
     Evaluator,
     InputError,
-    Kept,
     Mode,
     StepResult,
     get_formulation,
     levels_of,
     lower,
     one_by_one,
+    unmet_limits,
 )
 from ..solvers import PluginError, Status, get_solver
 
@@ -149,8 +150,10 @@ class InterpretedStep:
         if status is not Status.SOLVED and len(self._levels) > 1:
             message = f"{self._levels[len(levels) - 1].lowered.formulation.name}: {message}"
         qd = _command(instance, solution)
-        kept = Kept.of(qd, instance.J_fixed, instance.v_fixed, instance.qd_lo, instance.qd_hi)
-        off = (kept.joint_bounds or kept.locked_rows) if np.isfinite(qd).all() else "the command is not finite"
+        kept = CommandCheck.of(qd, instance.J_fixed, instance.v_fixed, instance.qd_lo, instance.qd_hi)
+        made = self._levels[-1].lowered.formulation
+        off = unmet_limits(qd, instance.limits, sampled=made.bounds == "viable", acceleration=made.limits_acceleration)
+        off = off or kept.joint_bounds or kept.locked_rows
         if status is Status.SOLVED and off:
             status, message = Status.INACCURATE, off
         solved = status is Status.SOLVED

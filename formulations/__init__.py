@@ -8,6 +8,7 @@ from .bounds import BOUNDS, thesis_bound, velocity_bounds, viable_bound
 from .cartesian_error import CartesianError
 from .cartesian_error_acceleration import CartesianErrorAcceleration
 from .cartesian_error_robust import CartesianErrorRobust
+from .command_check import BOUND_TOLERANCE, FIXED_TOLERANCE, CommandCheck, Limits, unmet_limits
 from .cuts import Cut
 from .damped import DEFAULT_DAMPING, Damped
 from .evaluator import Evaluator, Instance
@@ -19,7 +20,6 @@ from .joint_space import DEFAULT_JOINT_WEIGHT, JointSpace
 from .joint_space_acceleration import JointSpaceAcceleration
 from .joint_space_robust import JointSpaceRobust
 from .joint_space_weighted import JointSpaceWeighted, limit_gradient
-from .kept import BOUND_TOLERANCE, FIXED_TOLERANCE, Kept
 from .lowering import DATA, Lowered, RowNames, lower
 from .minimum_acceleration_norm import MinimumAccelerationNorm
 from .minimum_kinetic_energy import MinimumKineticEnergy
@@ -32,7 +32,7 @@ from .result import StepResult, one_by_one
 from .spy import PlotError
 from .task_scaling import TaskScaling
 from .tick import Tick
-from .tick_inputs import DEFAULT_DT, Input
+from .tick_inputs import DEFAULT_DT, LONGEST_DT, SHORTEST_DT, Input
 
 __all__ = [
     "ABOVE",
@@ -44,10 +44,13 @@ __all__ = [
     "DEFAULT_JOINT_WEIGHT",
     "DEFAULT_TIME_CONSTANT",
     "FIXED_TOLERANCE",
+    "LONGEST_DT",
     "MODE_NAMES",
+    "SHORTEST_DT",
     "CartesianError",
     "CartesianErrorAcceleration",
     "CartesianErrorRobust",
+    "CommandCheck",
     "Cut",
     "Damped",
     "DeclarationError",
@@ -62,7 +65,7 @@ __all__ = [
     "JointSpaceAcceleration",
     "JointSpaceRobust",
     "JointSpaceWeighted",
-    "Kept",
+    "Limits",
     "Lowered",
     "MinimumAccelerationNorm",
     "MinimumKineticEnergy",
@@ -91,6 +94,7 @@ __all__ = [
     "one_by_one",
     "robust_inverse",
     "thesis_bound",
+    "unmet_limits",
     "velocity_bounds",
     "viable_bound",
     "with_constraints",

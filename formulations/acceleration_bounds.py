@@ -51,21 +51,24 @@ def acceleration_bounds(qd_prev: ca.SX, qd_lo: ca.SX, qd_hi: ca.SX, qdd_max: ca.
     return (slowest - qd_prev) / dt, (fastest - qd_prev) / dt
 
 
-def braking(qd_prev: ca.SX, qd_lo: ca.SX, qd_hi: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> ca.SX:
-    """Command of the safe stop: the fastest admissible braking, shape (nv, 1) [rad/s or m/s].
+def braking(qd_prev: ca.SX, qd_lo: ca.SX, qd_hi: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> ca.SX:
+    """Command of the safe stop: as fast as `qdd_max` allows and no faster, shape (nv, 1) [rad/s or m/s].
 
     All joints are slowed down by one common factor, the smallest for which none brakes harder than `qdd_max`. The
     arm is at rest as soon as with every joint braking on its own (the joint that takes longest decides either way), but
     keeps its direction, so that the locked rows stay close to their values. A joint whose velocity bound asks for
-    less than that is at its bound. From an admissible state no joint exceeds `qdd_max`; from any other position and
-    velocity limits come first.
+    less than that is at its bound, as far as `qdd_max` lets it: from an admissible state it always does; from any
+    other the joint brakes at `qdd_max` until it is there.
 
     Parameters
     ----------
     qd_prev, qd_lo, qd_hi, qdd_max, dt
-        As in `acceleration_bounds`.
+        As in `acceleration_bounds`. A last command beyond `qd_max` counts as `qd_max`.
+    qd_max : ca.SX, shape (nv, 1)
+        Velocity limits, positive [rad/s or m/s].
     """
+    last, step = ca.fmax(ca.fmin(qd_prev, qd_max), -qd_max), qdd_max * dt
     # 1 - a dt / |qd|, at a joint at rest as small as it gets; the offset is far below any speed that is one.
-    shares = 1 - qdd_max * dt / (ca.fabs(qd_prev) + 1e-100)
-    factor = ca.fmax(ca.mmax(shares), 0)
-    return ca.fmin(ca.fmax(factor * qd_prev, qd_lo), qd_hi)
+    factor = ca.fmax(ca.mmax(1 - step / (ca.fabs(last) + 1e-100)), 0)
+    wanted = ca.fmin(ca.fmax(factor * last, qd_lo), qd_hi)
+    return ca.fmin(ca.fmax(wanted, last - step), last + step)

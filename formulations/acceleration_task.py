@@ -130,7 +130,7 @@ class YieldingLimits:
         qp.minimize(1 + stretch / STRETCH_SCALE, weight=STRETCH_SCALE * weight, name="acceleration limits")
         qp.between(0, stretch, ca.inf, name="stretch of acceleration limits")
         qp.between(hand.ahead(tick.qd_lo) - known, ahead, hand.ahead(tick.qd_hi) + known, name="joint limits")
-        more = (hand.T * tick.qdd_max) * stretch
+        more = (hand.T * tick.qdd_usable) * stretch
         qp.between(tick.qd_prev + hand.T * tick.qdd_lo, ahead + more, ca.inf, name="lower acceleration limits")
         qp.between(-ca.inf, ahead - more, tick.qd_prev + hand.T * tick.qdd_hi, name="upper acceleration limits")
         if torques:
@@ -148,7 +148,7 @@ class YieldingLimits:
     def feasible(self, ahead: ca.SX) -> dict[str, ca.SX]:
         """Give the stretches that a certain `ahead`, shape (nv, 1), needs, by the names of their variables."""
         tick, qdd = self.tick, self.hand.acceleration(ahead)
-        excess = ca.vertcat(qdd - tick.qdd_hi, tick.qdd_lo - qdd) / ca.vertcat(tick.qdd_max, tick.qdd_max)
+        excess = ca.vertcat(qdd - tick.qdd_hi, tick.qdd_lo - qdd) / ca.vertcat(tick.qdd_usable, tick.qdd_usable)
         values = {"stretch": ca.fmax(ca.mmax(excess), 0)}
         if self.torques:
             values["torque_stretch"] = ca.fmax(ca.mmax(ca.fabs(torque(tick, qdd)) / tick.tau_max) - 1, 0)

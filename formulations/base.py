@@ -39,15 +39,20 @@ class Formulation(ABC):
 
     Notes
     -----
-    `safe_stop` says what is sent where a tick is not solved: zero velocity at once, or, for a formulation that keeps to
-    acceleration limits, the fastest admissible braking from the last command (`kinqp.formulations.braking`). The
-    latter makes `qd_prev` an input of every step.
+    Where a tick is not solved the safe stop is sent. A step that is told the last command, `qd_prev`, brakes from it as
+    fast as the acceleration limits allow and no faster (`kinqp.formulations.braking`); one that is not can only send
+    zero velocity at once. `safe_stop = "braking"` makes `qd_prev` an input of every step, also of a formulation that
+    has no other use for it.
+
+    `limits_acceleration` says that a solved command is within `qdd_max` of the last one at every tick: it is then
+    checked like the other limits. A formulation whose acceleration limits may yield does not promise that.
     """
 
     bounds: str = "viable"
 
     name: ClassVar[str]
     safe_stop: ClassVar[SafeStop] = "zero"
+    limits_acceleration: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.bounds not in BOUNDS:

@@ -22,7 +22,7 @@ def thesis_bound(distance: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> c
     distance : ca.SX, shape (nv, 1)
         Distance to the limit [rad or m]; beyond the limit (negative) the bound is zero.
     qd_max, qdd_max : ca.SX, shape (nv, 1)
-        Velocity and acceleration limits [rad/s or m/s; rad/s^2 or m/s^2], positive.
+        Velocity and acceleration limits [rad/s or m/s; rad/s^2 or m/s^2], positive; `qdd_max` may be infinite (none).
     dt : ca.SX, scalar
         Control period [s].
 
@@ -30,9 +30,16 @@ def thesis_bound(distance: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> c
     -------
     ca.SX, shape (nv, 1)
         Never negative [rad/s or m/s].
+
+    Notes
+    -----
+    An acceleration of more than qd_max/dt, from the velocity limit to rest within one period, changes nothing: the
+    bound is then the smaller of distance/dt and `qd_max`. It is capped there, so that an infinite one is no special
+    case.
     """
     ahead = ca.fmax(distance, 0)
-    return ca.fmin(ca.fmin(ahead / dt, qd_max), ca.sqrt(2 * qdd_max * ahead))
+    a = ca.fmin(qdd_max, qd_max / dt)
+    return ca.fmin(ca.fmin(ahead / dt, qd_max), ca.sqrt(2 * a * ahead))
 
 
 def viable_bound(distance: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> ca.SX:
@@ -42,9 +49,9 @@ def viable_bound(distance: ca.SX, qd_max: ca.SX, qdd_max: ca.SX, dt: ca.SX) -> c
     :math:`\theta = (\delta - m(m+1)/2)/(m+1)` the bound is :math:`b(d) = a\,dt\,(m + \theta)`. It satisfies
     :math:`b(d - b\,dt) = b - a\,dt`: once inside always inside, landing on the limit with deceleration `a`, never more.
 
-    Parameters and result are those of `thesis_bound`.
+    Parameters, result and the cap on `qdd_max` are those of `thesis_bound`.
     """
-    step = qdd_max * dt  # velocity that one period of full braking takes away
+    step = ca.fmin(qdd_max * dt, qd_max)  # velocity that one period of full braking takes away
     per_step = 1 / (step * dt)  # the only division that both sides of a joint share; divisions are what costs here
     # Beyond this distance qd_max is the smaller of the two; the cap keeps an absent limit (infinite distance) finite.
     periods = qd_max * dt * per_step

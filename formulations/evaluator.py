@@ -10,10 +10,13 @@ import numpy as np
 
 from ..solvers import QP
 from .buffered import BufferedFunction
+from .command_check import Limits
 from .inputs import complete_inputs
 from .lowering import DATA, Lowered
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
     from ..solvers import Solution
@@ -46,6 +49,8 @@ class Instance:
         What was asked of the two [m/s, rad/s].
     stop : ndarray, shape (nv,)
         Command of the safe stop [rad/s or m/s].
+    limits : Limits
+        What the command is judged by.
     """
 
     qp: QP
@@ -59,6 +64,7 @@ class Instance:
     v: Array
     v_fixed: Array
     stop: Array
+    limits: Limits
 
 
 class Evaluator:
@@ -77,7 +83,7 @@ class Evaluator:
         tick = lowered.tick
         # Also what the formulation itself does not use: its command is judged against the limits all the same.
         observed = {name: getattr(tick, name) for name in _OBSERVED} | {"v_fixed": tick.v_fixed}
-        observed["stop"] = tick.qd_brake if lowered.formulation.safe_stop == "braking" else ca.SX.zeros(tick.nv, 1)
+        observed["stop"] = tick.qd_brake if lowered.brakes else ca.SX.zeros(tick.nv, 1)
         data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
         self.inputs: Final[tuple[Input, ...]] = tick.inputs
         outputs = data | {name: value for name, value in observed.items() if name != "v_fixed"}
@@ -110,8 +116,13 @@ class Evaluator:
         )  # fmt: skip
         return Instance(
             qp, r["K"], columns["k"], r["J_free"], r["J_fixed"], r["J_bar"], columns["qd_lo"], columns["qd_hi"],
-            given["v"].copy(), given["v_fixed"].copy(), columns["stop"],
+            given["v"].copy(), given["v_fixed"].copy(), columns["stop"], self._limits(given),
         )  # fmt: skip
+
+    def _limits(self, given: Mapping[str, Array]) -> Limits:
+        q, q_min, q_max, qd_max, qdd_max = (given[name].copy() for name in ("q", "q_min", "q_max", "qd_max", "qdd_max"))
+        last = given["qd_prev"].copy() if "qd_prev" in given else None
+        return Limits(q, q_min, q_max, qd_max, qdd_max, float(given["dt"][0]), last)
 
     def active_rows(self, qp: QP, solution: Solution) -> tuple[str, ...]:
         """Names of the rows that hold the solution back, each with its side, as in "joint limits[3] upper"."""

@@ -35,11 +35,10 @@ def check_input(spec: Input, given: ArrayLike, mode: Mode) -> Array:
         raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got {given!r}") from None
     if value.shape != (spec.size,) and not (spec.default is not None and value.ndim == 0):
         raise InputError(f"{spec.name}: expected {describe_input(spec, mode)}, got shape {value.shape}")
-    if not np.isfinite(value).all() and (not spec.may_be_infinite or np.isnan(value).any()):
+    if np.isnan(value).any() or (np.isinf(value).any() and not spec.may_be_infinite):
         raise InputError(f"{spec.name}: expected finite numbers, got {value}")
-    if spec.lowest > -np.inf and ((value < spec.lowest).any() or (spec.positive and (value <= spec.lowest).any())):
-        bound = "above" if spec.positive else "not below"
-        raise InputError(f"{spec.name}: expected numbers {bound} {spec.lowest:g} {spec.unit}, got {value}")
+    if not spec.admits(value):
+        raise InputError(f"{spec.name}: expected {spec.describe_range()}, got {value}")
     return value
 
 

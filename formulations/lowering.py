@@ -88,6 +88,11 @@ class Lowered:
         return (*(given.symbol for given in self.inputs), *cut)
 
     @property
+    def brakes(self) -> bool:
+        """Whether the step is told the last command, so that its safe stop is braking and not zero at once."""
+        return any(given.name == "qd_prev" for given in self.inputs)
+
+    @property
     def n(self) -> int:
         """Number of variables."""
         return int(self.function.size1_out("g"))
@@ -114,10 +119,11 @@ def lower(formulation: Formulation, robot: Robot, mode: Mode, *, cut: bool = Fal
         command.
     """
     tick = Tick(robot, mode, formulation.bounds, cut=cut)
-    # The state and the hand's velocity are inputs of every step, also of one that does not use them.
-    _ = tick.q, tick.v
-    if formulation.safe_stop == "braking":  # ... and so is what its safe stop needs
-        _ = tick.qd_brake
+    # Inputs of every step, also of one that does not use them ...
+    tick.declare_judged()
+    # ... and what its safe stop or its promise needs.
+    if formulation.safe_stop == "braking" or formulation.limits_acceleration:
+        tick.declare_last_command()
     qp = QuadraticProgram()
     formulation.declare(qp, tick)
     if not qp.variables or qp.command_expression is None:

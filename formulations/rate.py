@@ -44,7 +44,7 @@ class RateWindow:
     slowest, fastest : ca.SX, shape (nv, 1)
         Within the acceleration limit alone [rad/s or m/s].
     step : ca.SX, shape (nv, 1)
-        qdd_max dt [rad/s or m/s].
+        qdd_max dt, at most what can be used of it (`Tick.qdd_usable`) [rad/s or m/s].
     """
 
     low: ca.SX
@@ -92,7 +92,7 @@ def rate_window(tick: Tick, tau: ca.SX | None, *, jerk: bool = False) -> RateWin
         Keep the acceleration near the last one, too: it takes `jerk_time` to get from nothing to `qdd_max`. Where the
         locked rows themselves change the last command's continuation by more than that, by twice as much.
     """
-    step = tick.qdd_max * tick.dt
+    step = tick.qdd_usable * tick.dt
     slowest, fastest = tick.qd_prev - step, tick.qd_prev + step
     low, high = slowest, fastest
     if jerk:
@@ -121,7 +121,7 @@ def rate_window(tick: Tick, tau: ca.SX | None, *, jerk: bool = False) -> RateWin
 
 def continued(tick: Tick) -> ca.SX:
     """Joint velocities that the last acceleration leads to, shape (nv, 1); the last ones where it is unknown."""
-    step = tick.qdd_max * tick.dt
+    step = tick.qdd_usable * tick.dt
     last = ca.if_else(ca.fabs(tick.qdd_prev) < _UNKNOWN, tick.dt * tick.qdd_prev, 0)
     return tick.qd_prev + ca.fmax(-step, ca.fmin(step, last))
 

@@ -163,6 +163,14 @@ class Tick(TickInputs):
         """Upper joint velocity bounds, shape (nv, 1), never negative [rad/s or m/s]."""
         return self._bounds[1]
 
+    @property
+    def qdd_usable(self) -> ca.SX:
+        """Acceleration limits, at most what takes a joint from one velocity limit to the other within one period.
+
+        More than that can't be used; unlike `qdd_max` it is finite, shape (nv, 1) [rad/s^2 or m/s^2].
+        """
+        return ca.fmin(self.qdd_max, 2 * self.qd_max / self.dt)
+
     @cached_property
     def _acceleration_bounds(self) -> tuple[ca.SX, ca.SX]:
         return acceleration_bounds(self.qd_prev, self.qd_lo, self.qd_hi, self.qdd_max, self.dt)
@@ -179,8 +187,9 @@ class Tick(TickInputs):
 
     @cached_property
     def qd_brake(self) -> ca.SX:
-        """Fastest admissible braking from the last command, shape (nv, 1); see `braking` [rad/s or m/s]."""
-        return braking(self.qd_prev, self.qd_lo, self.qd_hi, self.qdd_max, self.dt)
+        """Fastest braking from the last command, shape (nv, 1); see `braking` [rad/s or m/s]."""
+        limits = (self.qd_max, self.qdd_max, self.dt)
+        return braking(self.qd_prev, *velocity_bounds("viable", self.q, self.q_min, self.q_max, *limits), *limits)
 
     @cached_property
     def qd_prev_free(self) -> ca.SX:

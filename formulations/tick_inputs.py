@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 DEFAULT_DT: Final = 1e-3
+# Control periods outside of this range are clocks that stand still or run wild, not control [s].
+SHORTEST_DT: Final = 1e-5
+LONGEST_DT: Final = 1.0
+# A positive number is a normal one: the reciprocal of a smaller one may be infinite.
+SMALLEST_POSITIVE: Final = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,8 @@ class Input:
         Whether `lowest` itself is refused too.
     may_be_infinite : bool
         Whether an infinite value is accepted ("no limit").
+    highest : float
+        Largest value that makes sense; a larger one is refused.
     """
 
     name: str
@@ -51,11 +58,32 @@ class Input:
     unit: str
     positive: bool = False
     may_be_infinite: bool = False
+    highest: float = np.inf
 
     @cached_property
     def size(self) -> int:
         """Number of entries."""
         return int(self.symbol.size1())
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value that is accepted."""
+        largest = np.inf if self.may_be_infinite else float(np.finfo(float).max)
+        lowest = max(self.lowest, SMALLEST_POSITIVE) if self.positive and self.lowest == 0.0 else self.lowest
+        return max(lowest, -largest), min(self.highest, largest)
+
+    def admits(self, value: Array) -> bool:
+        """Whether all numbers are within `range`; NaN never is."""
+        low, high = self.range
+        return bool(((value >= low) & (value <= high)).all() and not (self.positive and (value <= self.lowest).any()))
+
+    def describe_range(self) -> str:
+        """Say which numbers are accepted, with the unit."""
+        if self.highest < np.inf:
+            return f"numbers from {self.lowest:g} to {self.highest:g} {self.unit}"
+        if self.lowest == -np.inf:
+            return f"{'' if self.may_be_infinite else 'finite '}numbers [{self.unit}]"
+        return f"numbers {'above' if self.positive else 'not below'} {self.lowest:g} {self.unit}"
 
 
 class TickInputs:
@@ -103,6 +131,7 @@ class TickInputs:
         lowest: float = -np.inf,
         positive: bool = False,
         may_be_infinite: bool = False,
+        highest: float = np.inf,
         unit: str = "-",
     ) -> ca.SX:
         """Return the symbol of a run-time input; the same name gives the same symbol.
@@ -121,6 +150,8 @@ class TickInputs:
             Refuse `lowest` itself too.
         may_be_infinite : bool
             Accept infinite entries.
+        highest : float
+            Largest value that makes sense.
         unit : str
             For messages and generated comments.
 
@@ -139,14 +170,20 @@ class TickInputs:
                 raise ValueError(f"parameter {name}: expected its first size, {known.size}, got {size}")
             return known.symbol
         value = None if default is None else np.broadcast_to(np.asarray(default, dtype=float), (size,)).copy()
-        if value is not None and not (
-            np.all(value > lowest if positive else value >= lowest) and (may_be_infinite or np.all(np.isfinite(value)))
-        ):
-            kind, bound = "" if may_be_infinite else "finite ", "above" if positive else "not below"
-            raise ValueError(f"parameter {name}: expected a {kind}default {bound} {lowest:g}, got {default}")
-        made = Input(name, ca.SX.sym(name, size), value, lowest, unit, positive, may_be_infinite)
+        made = Input(name, ca.SX.sym(name, size), value, lowest, unit, positive, may_be_infinite, highest)
+        if value is not None and not made.admits(value):
+            raise ValueError(f"parameter {name}: expected as default {made.describe_range()}, got {default}")
         self._inputs[name] = made
         return made.symbol
+
+    def declare_judged(self) -> None:
+        """Make the inputs that every command is judged by, whatever the formulation uses: state, hand and limits."""
+        for made in ("q", "v", "v_fixed", "dt", "q_min", "q_max", "qd_max", "qdd_max"):
+            getattr(self, made)
+
+    def declare_last_command(self) -> None:
+        """Make the input that a safe stop by braking begins from, `qd_prev`."""
+        self.parameter("qd_prev", None, size=self.nv, unit="rad/s or m/s")
 
     @property
     def q(self) -> ca.SX:
@@ -176,7 +213,7 @@ class TickInputs:
     @property
     def dt(self) -> ca.SX:
         """Control period [s]."""
-        return self.parameter("dt", DEFAULT_DT, lowest=0.0, positive=True, unit="s")
+        return self.parameter("dt", DEFAULT_DT, lowest=SHORTEST_DT, highest=LONGEST_DT, unit="s")
 
     @property
     def q_min(self) -> ca.SX:
@@ -195,8 +232,8 @@ class TickInputs:
 
     @property
     def qdd_max(self) -> ca.SX:
-        """Acceleration limits, shape (nv, 1) [rad/s^2 or m/s^2]."""
-        return self._limit("qdd_max", self.robot.qdd_max, "rad/s^2 or m/s^2")
+        """Acceleration limits, infinite where there is none, shape (nv, 1) [rad/s^2 or m/s^2]."""
+        return self._limit("qdd_max", self.robot.qdd_max, "rad/s^2 or m/s^2", may_be_infinite=True)
 
     @property
     def tau_max(self) -> ca.SX:

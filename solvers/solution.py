@@ -34,6 +34,7 @@ class Status(StrEnum):
     DUAL_INFEASIBLE = "dual_infeasible"
     INACCURATE = "inaccurate"
     FAILED = "failed"
+    BAD_PARAMETER = "bad_parameter"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -4,6 +4,11 @@
 
 #include <math.h>
 
+/* What is checked here can't be checked where a compiler may assume that there is no NaN, or reorder sums. */
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__) || defined(__ASSOCIATIVE_MATH__)
+#error "kinqp: compile without -ffast-math, -Ofast and -ffinite-math-only; numbers have to behave as IEEE 754 says"
+#endif
+
 /* What the bounds of arrays rest on; looked at only where KINQP_DEBUG is defined. */
 #if defined(KINQP_ASSERT)
 #elif defined(KINQP_DEBUG)
@@ -45,10 +50,14 @@ typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 /* a where x > y, else b; and the same for a condition given as bits. */
 #define kinqp_part_choose(x, y, a, b) kinqp_bits_choose((kinqp_bits)((x) > (y)), a, b)
 #define kinqp_part_excludes_zero(lo, hi) kinqp_bits_any(~((kinqp_bits)((lo) <= 0.0) & (kinqp_bits)((hi) >= 0.0)))
+/* Bits that are not zero where x is outside of [least, most]; NaN is outside of everything. */
+#define kinqp_part_misses(x, least, most) (~((kinqp_bits)((x) >= (least)) & (kinqp_bits)((x) <= (most))))
+#define kinqp_bits_none ((kinqp_bits)(kinqp_part_fill(0.0)))
 #define kinqp_bits_choose(where, a, b) ((kinqp_part)(((kinqp_bits)(a) & (where)) | ((kinqp_bits)(b) & ~(where))))
 #else
 #define KINQP_INLINE static inline
 typedef double kinqp_part;
+typedef int kinqp_bits;
 #define KINQP_PARTS 4
 #define kinqp_part_fill(x) (x)
 #define kinqp_part_root(x) sqrt(x)
@@ -56,6 +65,9 @@ typedef double kinqp_part;
 #define kinqp_part_store(p, x) (*(p) = (x))
 #define kinqp_part_choose(x, y, a, b) ((x) > (y) ? (a) : (b))
 #define kinqp_part_excludes_zero(lo, hi) (!((lo) <= 0.0 && (hi) >= 0.0))
+#define kinqp_part_misses(x, least, most) (!((x) >= (least) && (x) <= (most)))
+#define kinqp_bits_none 0
+#define kinqp_bits_any(x) ((x) != 0)
 #endif
 typedef struct {
     kinqp_part at[KINQP_PARTS];

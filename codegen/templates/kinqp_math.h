@@ -2,7 +2,21 @@
 #ifndef KINQP_MATH_H
 #define KINQP_MATH_H
 
+#include <float.h>
 #include <math.h>
+#include <string.h>
+
+/* Whether all n numbers are finite, by their bits: no compiler flag can make it forget NaN. */
+KINQP_INLINE int kinqp_finite(int n, const double *x) {
+    const unsigned long long exponent = 0x7ff0000000000000ULL;
+    int finite = 1;
+    for (int i = 0; i < n; ++i) {
+        unsigned long long bits;
+        memcpy(&bits, x + i, sizeof bits);
+        finite &= (bits & exponent) != exponent;
+    }
+    return finite;
+}
 
 /* floor(x); the largest value not above x among the whole numbers. */
 KINQP_INLINE double kinqp_floor(double x) {

@@ -155,6 +155,7 @@ class Constrained(Formulation):
     def __post_init__(self) -> None:
         object.__setattr__(self, "bounds", self.formulation.bounds)
         object.__setattr__(self, "safe_stop", self.formulation.safe_stop)
+        object.__setattr__(self, "limits_acceleration", self.formulation.limits_acceleration)
         object.__setattr__(self, "constraints", tuple(self.constraints))
         super().__post_init__()
         names = [constraint.name for constraint in self.constraints]

@@ -12,7 +12,8 @@ typedef enum {
     KINQP_PRIMAL_INFEASIBLE = 2, /* no point satisfies the constraints; the duals hold the certificate */
     KINQP_DUAL_INFEASIBLE = 3,   /* unbounded below; x holds the direction */
     KINQP_INACCURATE = 4,        /* an answer, but its residuals miss the tolerance */
-    KINQP_FAILED = 5             /* not solvable as given: NaN, non-convex, impossible sizes */
+    KINQP_FAILED = 5,            /* not solvable as given: NaN, non-convex, impossible sizes */
+    KINQP_BAD_PARAMETER = 6      /* of a generated step: a parameter out of its range; nothing was computed with it */
 } kinqp_status;
 
 #ifdef __cplusplus

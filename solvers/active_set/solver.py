@@ -26,6 +26,7 @@ STATUSES = (
     Status.DUAL_INFEASIBLE,
     Status.INACCURATE,
     Status.FAILED,
+    Status.BAD_PARAMETER,
 )
 
 

@@ -6,7 +6,7 @@ KINQP_INLINE void kinqp_thesis_bounds(int n, const double *q, const double *q_mi
     for (int i = 0; i < n; ++i) {
         distance[i] = q[i] - q_min[i];
         distance[n + i] = q_max[i] - q[i];
-        twice[i] = twice[n + i] = 2.0 * qdd_max[i];
+        twice[i] = twice[n + i] = 2.0 * (qdd_max[i] < qd_max[i] / dt ? qdd_max[i] : qd_max[i] / dt);
         most[i] = most[n + i] = qd_max[i];
     }
     for (int i = 0; i < 2 * n; ++i) {

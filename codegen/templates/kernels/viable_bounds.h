@@ -29,7 +29,8 @@ KINQP_INLINE void kinqp_viable_bounds(int n, const double *q, const double *q_mi
             }
         }
         const kinqp_part at = kinqp_part_load(fields[0]), most = kinqp_part_load(fields[3]);
-        const kinqp_part step = kinqp_part_load(fields[4]) * period, per_step = one / (step * period);
+        const kinqp_part taken = kinqp_part_load(fields[4]) * period, step = kinqp_part_choose(most, taken, taken, most);
+        const kinqp_part per_step = one / (step * period);
         const kinqp_part periods = most * period * per_step, far = half * periods * (periods + one) + one;
         const kinqp_part below = kinqp_viable_bound(at - kinqp_part_load(fields[1]), most, step, per_step, far);
         const kinqp_part above = kinqp_viable_bound(kinqp_part_load(fields[2]) - at, most, step, per_step, far);
