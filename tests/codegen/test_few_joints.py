@@ -15,6 +15,7 @@ from kinqp.control import InterpretedStep, make_step
 from kinqp.formulations import available_formulations
 from kinqp.solvers import Status
 from tests.codegen.compiled import QUICK_FLAGS, REFERENCE_SOLVER, SPEEDS
+from tests.formulations.reference import rows_at
 from tests.robots.arms import arm
 from tests.robots.chains import chain, scara
 
@@ -51,6 +52,22 @@ def test_a_scara_arm_moves_along_its_spindle(formulation: str) -> None:
             # Damping and weights of the joints cost some of the speed.
             np.testing.assert_allclose(result.qd, speed * SPINDLE, rtol=0, atol=5e-3 * abs(speed) + 1e-12)
         np.testing.assert_allclose(compiled(q, [speed], **memory).qd, result.qd, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("formulation", ["joint-space", "minimum-velocity-norm"])
+def test_rounding_in_rows_that_no_joint_moves_contradicts_nothing(formulation: str) -> None:
+    """The tool hangs by a turn of pi, which no double is: a locked row is 1e-16, and so is what is asked of it."""
+    robot, rng = scara(), np.random.default_rng(1)
+    compiled, _ = steps(robot, formulation, "line:z")
+    for _ in range(20):
+        q = robot.random_configuration(rng)
+        _, locked = rows_at(robot, compiled.mode, q)
+        drift = locked @ rng.normal(size=4) * 0.02
+        sizes = np.abs(locked).max(axis=1)
+        assert ((sizes > 0.0) & (sizes < 1e-14)).any()
+        result = compiled(q, [0.0], v_fixed=drift)
+        assert result.status is Status.SOLVED
+        np.testing.assert_allclose(locked @ result.qd, drift, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,8 @@ from unittest import mock
 import pytest
 
 from kinqp.codegen import export
-from kinqp.codegen.render import _INCLUDE, _flatten, _keep_instantiated, general_solver
 from kinqp.control import export_guiding
 from kinqp.formulations import available_formulations
-from kinqp.solvers.active_set import fixed_size_sources
 from tests.programs import need
 from tests.robots.chains import chain
 
@@ -43,15 +41,6 @@ def exported(formulation: str) -> dict[str, str]:
     ):
         export_guiding(chain(3), formulation, MODES, folder, name=PREFIX)
         return {path.name: path.read_text(encoding="utf-8") for path in Path(folder).iterdir()}
-
-
-@functools.cache
-def solver_text() -> str:
-    """The solver as it is written into exports, for sizes known at run time and at compile time."""
-    sources = fixed_size_sources()
-    header = _INCLUDE.sub("", sources["kinqp_as.h"])
-    fixed = _flatten(_INCLUDE.sub(_keep_instantiated, sources["kinqp_as_fixed.h"]), sources)
-    return "\n".join((general_solver(), header, fixed))
 
 
 def capitals(text: str) -> set[str]:
@@ -81,17 +70,16 @@ def own(name: str) -> bool:
 )
 def test_no_name_of_generated_code_is_one_that_a_macro_may_have(formulation: str) -> None:
     """In lower case, or behind a prefix: see `C_NAMES`."""
-    of_solver = capitals(solver_text())
     for file, text in exported(formulation).items():
         if file.endswith((".c", ".h")):
-            assert {name for name in capitals(text) - of_c() - of_solver if not own(name)} == set(), file
+            assert {name for name in capitals(text) - of_c() if not own(name)} == set(), file
 
 
 @pytest.mark.parametrize("formulation", KINDS)
 def test_an_export_compiles_beside_macros(formulation: str, tmp_path: Path) -> None:
     for file, text in exported(formulation).items():
         (tmp_path / file).write_text(text, encoding="utf-8")
-    defines = [f"-D{name}=3" for name in MACROS if name not in capitals(solver_text())]
+    defines = [f"-D{name}=3" for name in MACROS]
     files = [file for file in exported(formulation) if file.endswith(".c")]
     line = [need("gcc"), "-std=c99", "-fsyntax-only", *defines, *files]
     done = subprocess.run(line, cwd=tmp_path, capture_output=True, text=True, check=False)

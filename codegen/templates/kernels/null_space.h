@@ -3,23 +3,27 @@
  *
  * rows: overwritten by the reflections, in the order `order`, with factors beta (m,). along (m,): the smallest solution of
  * rows x = b in the axes that the reflections give. Returns the rank, or -1 if the equalities contradict each other by more
- * than 1e-9. A row counts as dependent below 1e-10 of its length. */
+ * than 1e-9. A row counts as dependent below 1e-10 of its length, or below 1e-14 of the longest row: a joint that can't move
+ * a row leaves rounding there, which is no equation. What is asked of such a row may be as far off. */
 KINQP_INLINE int kinqp_reflect(int m, int n, double *rows, const double *b, double *beta, double *along, int *order) {
     const int stride = kinqp_padded(n);
     double length2[KINQP_EQUALITIES], rest2[KINQP_EQUALITIES], triangle[KINQP_EQUALITIES * KINQP_LARGEST], head[KINQP_LARGEST];
     const int most = m < n ? m : n;
+    double longest2 = 0.0;
     int rank = 0;
     KINQP_ASSERT(m <= KINQP_EQUALITIES && n <= KINQP_LARGEST);
     for (int i = 0; i < m; ++i) {
         length2[i] = rest2[i] = kinqp_dot_padded(stride, rows + i * stride, rows + i * stride);
+        longest2 = length2[i] > longest2 ? length2[i] : longest2;
         order[i] = i;
     }
+    const double noise2 = 1e-28 * longest2;
     for (; rank < most; ++rank) {
         /* The row with the largest share still outside the span of those before. */
         int best = -1;
         double rest = 1e-20, whole = 1.0;
         for (int i = rank; i < m; ++i) {
-            if (rest2[order[i]] * whole > rest * length2[order[i]]) {
+            if (rest2[order[i]] * whole > rest * length2[order[i]] && rest2[order[i]] > noise2) {
                 rest = rest2[order[i]];
                 whole = length2[order[i]];
                 best = i;
@@ -51,7 +55,7 @@ KINQP_INLINE int kinqp_reflect(int m, int n, double *rows, const double *b, doub
             terms += fabs(triangle[order[i] * most + k] * along[k]);
         }
         if (i < rank) along[i] = value / head[i];
-        else if (!(fabs(value) <= 1e-9 * (terms + sqrt(length2[order[i]])))) return -1;
+        else if (!(fabs(value) <= 1e-9 * (terms + sqrt(length2[order[i]])) + 1e-12 * sqrt(longest2))) return -1;
     }
     return rank;
 }
