@@ -70,9 +70,8 @@ def is_dual_infeasibility_certificate(qp: QP, direction: Array, tol: float = CER
     """Check a direction that claims to prove that the objective of a QP has no lower bound.
 
     The direction d must have no curvature (Hd = 0), descend (g'd < 0), keep the equalities (Ad = 0) and point
-    away from every side that exists, each to `tol` relative to the size of d and of the data; in the variables as they
-    are, or in units in which H has a unit diagonal or, where that is zero, the rows have unit columns. Where variables
-    come in units that differ by much, sizes say something in the latter only.
+    away from every side that exists, each to `tol` relative to the size of d and of the data: in units of the variables
+    in which H has a unit diagonal or, where that is zero, the rows have unit columns.
 
     Parameters
     ----------
@@ -85,11 +84,7 @@ def is_dual_infeasibility_certificate(qp: QP, direction: Array, tol: float = CER
     """
     if not np.isfinite(direction).all() or not direction.any():
         return False
-    return any(_is_ray(qp, direction, unit, tol) for unit in (np.ones(qp.n), _units(qp)))
-
-
-def _is_ray(qp: QP, direction: Array, unit: Array, tol: float) -> bool:
-    """Check a direction in variables of the given units, shape (n,)."""
+    unit = _units(qp)
     H, g, stacked, d = qp.H * np.outer(unit, unit), qp.g * unit, qp.stacked * unit, direction / unit
     d = d / np.abs(d).max()
     movement = stacked @ d
