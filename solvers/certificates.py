@@ -70,7 +70,9 @@ def is_dual_infeasibility_certificate(qp: QP, direction: Array, tol: float = CER
     """Check a direction that claims to prove that the objective of a QP has no lower bound.
 
     The direction d must have no curvature (Hd = 0), descend (g'd < 0), keep the equalities (Ad = 0) and point
-    away from every side that exists, each to `tol` relative to the size of d and of the data.
+    away from every side that exists, each to `tol` relative to the size of d and of the data; in the variables as they
+    are, or in units in which H has a unit diagonal or, where that is zero, the rows have unit columns. Where variables
+    come in units that differ by much, sizes say something in the latter only.
 
     Parameters
     ----------
@@ -81,15 +83,30 @@ def is_dual_infeasibility_certificate(qp: QP, direction: Array, tol: float = CER
     tol
         Relative tolerance.
     """
-    length = float(np.abs(direction).max())
-    if not np.isfinite(length) or length == 0.0:
+    if not np.isfinite(direction).all() or not direction.any():
         return False
-    d = direction / length
-    movement = qp.stacked @ d
-    slack = tol * np.abs(qp.stacked).sum(axis=1)
+    return any(_is_ray(qp, direction, unit, tol) for unit in (np.ones(qp.n), _units(qp)))
+
+
+def _is_ray(qp: QP, direction: Array, unit: Array, tol: float) -> bool:
+    """Check a direction in variables of the given units, shape (n,)."""
+    H, g, stacked, d = qp.H * np.outer(unit, unit), qp.g * unit, qp.stacked * unit, direction / unit
+    d = d / np.abs(d).max()
+    movement = stacked @ d
+    slack = tol * np.abs(stacked).sum(axis=1)
     return bool(
-        (np.abs(qp.H @ d) <= tol * np.abs(qp.H).max()).all()
-        and qp.g @ d < -tol * np.abs(qp.g).max()
+        (np.abs(H @ d) <= tol * np.abs(H).max()).all()
+        and g @ d < -tol * np.abs(g).max()
         and (movement <= slack)[np.isfinite(qp.upper)].all()
         and (movement >= -slack)[np.isfinite(qp.lower)].all()
     )
+
+
+def _units(qp: QP) -> Array:
+    """Units of the variables in which H has a unit diagonal or, where that is zero, the rows have unit columns."""
+    curvature = np.diag(qp.H)
+    rows = np.abs(qp.stacked[: qp.m_eq + qp.m_ineq])
+    longest = rows.max(axis=1, initial=0.0)
+    column = (rows / np.where(longest > 0.0, longest, 1.0)[:, None]).max(axis=0, initial=0.0)
+    size = np.where(curvature > 0.0, np.sqrt(np.abs(curvature)), column)
+    return 1.0 / np.where(size > 0.0, size, 1.0)

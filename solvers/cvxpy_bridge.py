@@ -20,7 +20,7 @@ from .solution import RawSolution, Status
 from .solver import BackendError, Solver
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from .validation import Array
 
@@ -224,6 +224,10 @@ def bridge(member: str) -> type[Solver]:
         @classmethod
         def _bridged(cls) -> str:
             return member
+
+        @classmethod
+        def _found_by(cls) -> tuple[Callable[..., type[Solver]], tuple[str, ...]]:
+            return bridge, (member,)
 
     return Bridged
 

@@ -6,6 +6,8 @@ import difflib
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
@@ -20,7 +22,11 @@ class UnknownOptionError(TypeError):
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float if it is a finite positive number, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not (0.0 < value < math.inf):
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float | np.integer | np.floating)
+        or not (0.0 < value < math.inf)
+    ):
         raise OptionError(f"{name} must be a positive number, but is {value!r}.")
     return float(value)
 
@@ -35,10 +41,10 @@ def gap_tolerance(tolerance: float) -> float:
 
 
 def count(name: str, value: int) -> int:
-    """Return `value` if it is an integer of at least 1, else raise `OptionError`."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+    """Return `value` as an int if it is an integer, of Python or NumPy, of at least 1, else raise `OptionError`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
         raise OptionError(f"{name} must be an integer of at least 1, but is {value!r}.")
-    return value
+    return int(value)
 
 
 def flag(name: str, value: object) -> bool:

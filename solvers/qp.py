@@ -12,8 +12,8 @@ from .validation import (
     Array,
     QPError,
     convex,
+    order_bounds,
     require_finite,
-    require_ordered,
     to_array,
     to_bound,
     to_matrix,
@@ -36,13 +36,15 @@ class QP:
     infinite bound means that this side is absent.
 
     Construct with keywords; everything but ``H`` and ``g`` may be left out. All arrays are copied, float64,
-    C-contiguous and read-only. The constraints are also there in one piece, equalities first and box last, as
-    ``lower <= stacked @ x <= upper`` with ``stacked = [A; C; I]``; A, b, C, l, u, lb and ub are views of it.
+    C-contiguous and read-only; bounds that cross by rounding alone are set to their middle. The constraints are also
+    there in one piece, equalities first and box last, as ``lower <= stacked @ x <= upper`` with
+    ``stacked = [A; C; I]``; A, b, C, l, u, lb and ub are views of it.
 
     Parameters
     ----------
     H
-        Hessian, symmetric positive semi-definite, shape (n, n).
+        Hessian, symmetric positive semi-definite, shape (n, n). Of an array in single precision the rounding of that is
+        allowed for, and negative eigenvalues within it are lifted to zero.
     g
         Linear cost, shape (n,).
     A, b
@@ -94,23 +96,23 @@ class QP:
             raise QPError(f"H must be square with at least one row, but has shape {hessian.shape}.")
         n = len(hessian)
         require_finite("H", hessian)
-        hessian = convex(hessian)
+        hessian = convex(hessian, single=getattr(H, "dtype", None) in (np.float32, np.float16))
         cost = to_vector("g", g, n, "the number of variables")
+        equal = to_matrix("A", A, n)
+        rows = to_matrix("C", C, n)
         if A is None and b is not None:
             raise QPError("b was given without A, but each entry of b belongs to a row of A.")
-        if A is not None and b is None:
+        if len(equal) and b is None:
             raise QPError("A was given without b, but each row of A needs a right-hand side.")
         if C is None and (l is not None or u is not None):
             raise QPError("l or u was given without C, but their entries belong to rows of C (lb and ub to x).")
-        equal = to_matrix("A", A, n)
-        rows = to_matrix("C", C, n)
         right = to_vector("b", () if b is None else b, len(equal), "the number of rows of A")
         low = to_bound("l", l, len(rows), "the number of rows of C", -np.inf)
         high = to_bound("u", u, len(rows), "the number of rows of C", np.inf)
         box_low = to_bound("lb", lb, n, "the number of variables", -np.inf)
         box_high = to_bound("ub", ub, n, "the number of variables", np.inf)
-        require_ordered("l", low, "u", high)
-        require_ordered("lb", box_low, "ub", box_high)
+        order_bounds("l", low, "u", high)
+        order_bounds("lb", box_low, "ub", box_high)
         start = None if x_feasible is None else to_vector("x_feasible", x_feasible, n, "the number of variables")
         self._assemble(
             hessian,

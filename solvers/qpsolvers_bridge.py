@@ -18,7 +18,7 @@ from .solution import RawSolution, Status
 from .solver import BackendError, Solver
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from .qp import QP
     from .solution import Certificate
@@ -213,6 +213,10 @@ def bridge(member: str) -> type[Solver]:
         @classmethod
         def _bridged(cls) -> tuple[str, Member]:
             return member, known
+
+        @classmethod
+        def _found_by(cls) -> tuple[Callable[..., type[Solver]], tuple[str, ...]]:
+            return bridge, (member,)
 
     return Bridged
 

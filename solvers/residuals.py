@@ -26,7 +26,8 @@ class Residuals:
     The scaled values do not change when a row of A or C, or the whole objective, is multiplied by a number,
     so that a wrong answer cannot hide behind small units:
 
-    - ``primal_scaled``: the violation of row c'x, divided by ``|c|'(1 + |x|)``; of the box, by ``1 + |x_j|``.
+    - ``primal_scaled``: the violation of row c'x, divided by ``|c|'(1 + |x|)``; of the box, by ``1 + |x_j|``; of a row
+      of zeros, as it is.
     - ``dual_scaled``: ``dual`` divided by the gradient's size, the largest entry of |H|, |Hx|, |g| and
       |A'y + C'z + z_box|.
     - ``gap_scaled``: ``gap`` divided by the gradient's size times ``1 + max|x|``.
@@ -85,8 +86,9 @@ def residuals(qp: QP, x: Array, y: Array, z: Array, z_box: Array) -> Residuals:
         size = np.abs(x) + 1.0
         activity = stacked.dot(x)
         violation = np.maximum(activity - qp.upper, qp.lower - activity)
-        # No x can repair a violated row of zeros, so it may count as infinitely wrong.
-        scale = np.maximum(np.abs(stacked).dot(size), _TINY)
+        # A row of zeros has no unit, and no x changes it: it counts absolutely. Its bound may carry rounding.
+        scale = np.abs(stacked).dot(size)
+        scale[scale < _TINY] = 1.0
         kept, support = effective_multipliers(qp, np.concatenate((y, z, z_box)))
         pull = kept.dot(stacked)
         Hx = H.dot(x)

@@ -141,6 +141,10 @@ def judge(qp: QP, raw: RawSolution, setup_time: float, solve_time: float, *, upd
     elif raw.certificate is not None and not raw.certificate.proves(qp):
         status = Status.INACCURATE
         message = f"The backend claims {raw.claimed.value}, but its certificate does not prove it."
+    elif status is not Status.SOLVED and not message:
+        infeasible = status in (Status.PRIMAL_INFEASIBLE, Status.DUAL_INFEASIBLE)
+        proof = ", and offers no proof of it" if infeasible and raw.certificate is None else ""
+        message = f"The backend claims {raw.claimed.value}{proof}."
     return Solution(
         x=x,
         y=y,

@@ -6,15 +6,14 @@ from abc import ABC, abstractmethod
 from importlib.util import find_spec
 from time import perf_counter_ns
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, final
+from typing import TYPE_CHECKING, Any, ClassVar, Self, final
 
 from .options import positive
+from .qp import QP
 from .solution import RawSolution, Solution, Status, judge
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from .qp import QP
+    from collections.abc import Callable, Mapping
 
 
 class BackendError(RuntimeError):
@@ -31,7 +30,8 @@ class Solver(ABC):
 
     A backend is a final subclass that says what it can do in the class variables below, takes its options as
     keyword arguments of its constructor and implements three hooks. It keeps its set-up between calls, so one
-    instance belongs to one thread.
+    instance belongs to one thread. Copies and pickles hold the options alone: what comes back is a new solver made with
+    them, without a set-up and without a memory of problems before.
 
     Parameters
     ----------
@@ -55,6 +55,15 @@ class Solver(ABC):
     #: options of its constructor that make it.
     starts: ClassVar[Mapping[str, Mapping[str, object]]] = MappingProxyType({})
 
+    #: What the constructor was called with.
+    _made_with: tuple[tuple[Any, ...], dict[str, Any]]
+
+    def __new__(cls, *arguments: Any, **options: Any) -> Self:
+        """Keep the options, of which `__reduce__` makes copies."""
+        self = super().__new__(cls)
+        self._made_with = arguments, options
+        return self
+
     def __init__(self, *, tolerance: float) -> None:
         self.tolerance = positive("tolerance", tolerance)
         self._structure: tuple[int, int, int, bytes] | None = None
@@ -71,13 +80,31 @@ class Solver(ABC):
         """Whether everything this backend requires is installed."""
         return not cls.missing()
 
+    @classmethod
+    def _found_by(cls) -> tuple[Callable[..., type[Solver]], tuple[str, ...]] | None:
+        """Return a function and its arguments that find this class, where its own name does not."""
+        return None
+
+    @final
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Say how `pickle` and `copy` make another one: from the options, since native objects cannot be copied."""
+        found = type(self)._found_by()
+        return _remade, (type(self) if found is None else None, found, *self._made_with)
+
     @final
     def solve(self, qp: QP) -> Solution:
         """Solve a QP, reusing the last set-up where the structure is the same, and judge the answer.
 
         Failures of the backend do not raise: they come back as `Status.FAILED` with a message. After anything but
         `Status.SOLVED` the set-up is dropped, because some backends do not recover from bad data by an update.
+
+        Raises
+        ------
+        TypeError
+            When `qp` is something else.
         """
+        if not isinstance(qp, QP):
+            raise TypeError(f"qp: expected a QP, got {type(qp).__name__}; make one as QP(H=..., g=...)")
         start = ready = perf_counter_ns()
         structure = qp.structure
         updated = structure == self._structure
@@ -114,3 +141,17 @@ class Solver(ABC):
     @abstractmethod
     def _solve(self, qp: QP) -> RawSolution:
         """Solve the problem that was last set up or updated, which is `qp`."""
+
+
+def _remade(
+    cls: type[Solver] | None,
+    found: tuple[Callable[..., type[Solver]], tuple[str, ...]] | None,
+    arguments: tuple[Any, ...],
+    options: dict[str, Any],
+) -> Solver:
+    """Make a solver from its class, or from what finds the class, and its options."""
+    if cls is None:
+        assert found is not None  # noqa: S101  # `__reduce__` gives one of the two
+        function, names = found
+        cls = function(*names)
+    return cls(*arguments, **options)

@@ -9,6 +9,7 @@
 #define KINQP_AS_DIMS(s) const int n = (s)->n, m = (s)->m; (void)n; (void)m
 
 #include "kinqp_as_factor.inc"
+#include "kinqp_as_steps.inc"
 #include "kinqp_as_core.inc"
 #include "kinqp_as_primal.inc"
 
@@ -59,16 +60,17 @@ void kinqp_as_setup(kinqp_as_state *state, int n, int m, void *memory) {
     next += m;
     state->rows = (int *)(void *)next;
     state->signs = state->rows + n;
+    state->slack = state->noise = state->offset = NULL;
 }
 
-kinqp_status kinqp_as_solve(kinqp_as_state *state, const double *M, const double *lo, const double *hi,
+kinqp_status kinqp_as_solve(kinqp_as_state *state, const double *matrix, const double *lo, const double *hi,
                             const double *target, const double *admissible, const kinqp_as_options *options, double *w,
                             double *z, int *active, kinqp_as_result *result) {
-    return kinqp_as_any_solve(state, M, lo, hi, target, admissible, options, w, z, active, result);
+    return kinqp_as_any_solve(state, matrix, lo, hi, target, admissible, options, w, z, active, result);
 }
 
-kinqp_status kinqp_as_primal(kinqp_as_state *state, const double *M, const double *lo, const double *hi,
+kinqp_status kinqp_as_primal(kinqp_as_state *state, const double *matrix, const double *lo, const double *hi,
                              const double *admissible, const kinqp_as_options *options, double *w, double *z,
                              int *active, kinqp_as_result *result) {
-    return kinqp_as_any_primal(state, M, lo, hi, admissible, options, w, z, active, result);
+    return kinqp_as_any_primal(state, matrix, lo, hi, admissible, options, w, z, active, result);
 }

@@ -21,7 +21,8 @@ extern "C" {
 typedef struct {
     double violation;    /* a row is violated if farther [unit of w] than this times max(|w|, scale) [-] */
     double dependence;   /* a row is dependent if less than this share of it is outside the active normals [-] */
-    double inconsistent; /* a dependent row violated by less than this counts as satisfied, else infeasible [-] */
+    double inconsistent; /* a dependent row violated by less than this times max(|w|, scale) counts as satisfied, else
+                          * infeasible; a row of zeros by less than this itself [-] */
     double scale;        /* length that the data's own rounding is relative to, e.g. |v| [unit of w] */
     int max_iterations;  /* cap on steps, each adding or dropping one row [count] */
     int warm;            /* 1: start from the signs in `active`; 0: cold [flag] */
@@ -35,6 +36,8 @@ typedef struct {
     double scaling;      /* share kept of the way from the admissible point to the iterate; 1: not scaled [-] */
 } kinqp_as_result;
 
+/* Why indices stay inside: at most n rows are active at once, since a row enters only if it is independent of those that
+ * are, and the loops over rows end at m. Where k is compared with n (append, drop, enter) it says more. */
 typedef struct {
     int n;               /* columns of M [count] */
     int m;               /* rows of M [count] */
@@ -52,6 +55,11 @@ typedef struct {
     double *gap;         /* how far each row is outside; negative: inside (m,) [unit of M w] */
     int *rows;           /* active rows in the order of Q's columns (n,) [index] */
     int *signs;          /* -1: lower side, +1: upper side, per active row (n,) */
+    const double *slack; /* NULL, or how far a row may be outside before it enters (m,) [unit of M w] */
+    const double *noise; /* NULL, or how far each bound may be off: what contradicts others by less than their sum counts as
+                          * satisfied; instead of `inconsistent` (m,) [unit of M w] */
+    const double *offset; /* NULL, or multipliers z0 that the target already accounts for, as target + M'z0 is meant; then
+                           * a large target that active rows hold leaves no rounding. Needs `warm` (m,) [unit of z] */
 } kinqp_as_state;
 
 /* Defaults: cold, polished, max_iterations = 10 (m + n) + 50. */
@@ -60,7 +68,7 @@ kinqp_as_options kinqp_as_default_options(int n, int m);
 /* Bytes that kinqp_as_setup needs for m rows and n columns; 0 if a size is negative. */
 size_t kinqp_as_workspace_size(int n, int m);
 
-/* Lays the state out in `memory` (aligned for double, kinqp_as_workspace_size bytes). */
+/* Lays the state out in `memory` (aligned for double, kinqp_as_workspace_size bytes); slack, noise and offset are NULL. */
 void kinqp_as_setup(kinqp_as_state *state, int n, int m, void *memory);
 
 /* Solves. target: NULL, or the point t (n,) to stay near: then 1/2 |w - t|^2 is minimised and w - t + M'z = 0.
@@ -68,13 +76,13 @@ void kinqp_as_setup(kinqp_as_state *state, int n, int m, void *memory);
  * active: out (m,) in -1, 0, +1; in when options->warm.
  * admissible: NULL (fast), or a point (n,) that satisfies all rows (feasible): then a stop at the cap returns a point
  * on the segment from it to the iterate which satisfies all rows too, within options->violation. */
-kinqp_status kinqp_as_solve(kinqp_as_state *state, const double *M, const double *lo, const double *hi,
+kinqp_status kinqp_as_solve(kinqp_as_state *state, const double *matrix, const double *lo, const double *hi,
                             const double *target, const double *admissible, const kinqp_as_options *options, double *w,
                             double *z, int *active, kinqp_as_result *result);
 
 /* As kinqp_as_solve with target NULL, by a primal active set: from `admissible` (required) on, every iterate satisfies
  * all rows. Slower and less exact at a cap than kinqp_as_solve with an admissible point; kept for comparison. */
-kinqp_status kinqp_as_primal(kinqp_as_state *state, const double *M, const double *lo, const double *hi,
+kinqp_status kinqp_as_primal(kinqp_as_state *state, const double *matrix, const double *lo, const double *hi,
                              const double *admissible, const kinqp_as_options *options, double *w, double *z,
                              int *active, kinqp_as_result *result);
 

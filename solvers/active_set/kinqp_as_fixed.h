@@ -21,6 +21,8 @@
 #endif
 #define KINQP_AS_DIMS(s) enum { n = KINQP_AS_N, m = KINQP_AS_M }; (void)(s)
 
+/* Why indices stay inside: at most KINQP_AS_N rows are active at once, since a row enters only if it is independent of
+ * those that are, and the loops over rows end at KINQP_AS_M. Where k is compared with n (append, drop, enter) it says more. */
 typedef struct {
     double q[KINQP_AS_N * KINQP_AS_N]; /* orthonormal basis of the active normals, by columns [-] */
     double r[(KINQP_AS_N + 1) * KINQP_AS_N]; /* upper triangle, signed active normals = Q R, by columns, and a spare
@@ -40,6 +42,7 @@ typedef struct {
 } KINQP_AS_STATE;
 
 #include "kinqp_as_factor.inc"
+#include "kinqp_as_steps.inc"
 #include "kinqp_as_core.inc"
 #ifdef KINQP_AS_WITH_PRIMAL
 #include "kinqp_as_primal.inc"

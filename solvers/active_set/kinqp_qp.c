@@ -1,7 +1,6 @@
-/* The canonical QP: layout of the workspace and the outer passes. */
+/* The canonical QP: layout of the workspace, and the order of the parts. */
 #include "kinqp_qp.h"
 
-#include <float.h>
 #include <math.h>
 
 #include "kinqp_qp_internal.h"
@@ -9,11 +8,6 @@
 #define KINQP_CONVEX_TOLERANCE 1e-9 /* a pivot below minus this, relative to the largest: not convex [-] */
 #define KINQP_FLAT 1e-11            /* a pivot below this, relative to the largest: flat, proximal passes [-] */
 #define KINQP_PROXIMAL 1e-6         /* first proximal weight, relative to the largest curvature [-] */
-#define KINQP_PASSES_PER_WEIGHT 12  /* passes until the weight is lowered by 100 [count] */
-#define KINQP_REFINEMENTS 4         /* refinements per pass at most [count] */
-#define KINQP_MARGIN 0.01           /* proximal passes aim for this share of the tolerance [-] */
-#define KINQP_MARGIN_PASSES 6       /* passes granted for that once the tolerance itself is met [count] */
-#define KINQP_GRADIENT_SHARE 0.01   /* of the gradient's length counts as length of the data [-] */
 
 kinqp_qp_options kinqp_qp_default_options(int n, int p, int m) {
     kinqp_qp_options o;
@@ -43,7 +37,7 @@ static size_t core_doubles(int n, int rows) { return kinqp_as_workspace_size(n, 
 size_t kinqp_qp_workspace_size(int n, int p, int m) {
     if (n < 0 || p < 0 || m < 0) return 0;
     const size_t a = (size_t)n, c = (size_t)m, e = (size_t)p + c + a;
-    const size_t doubles = 5 * a * a + c * a + 2 * e * a + (c + a) * a + 13 * a + c + 3 * e + 5 * (c + a);
+    const size_t doubles = 5 * a * a + c * a + 2 * e * a + (c + a) * a + 13 * a + c + 4 * e + 9 * (c + a);
     const size_t ints = 2 * e + 2 * (c + a) + a;
     return (doubles + core_doubles(n, m + n)) * sizeof(double) + ints * sizeof(int) + 2 * sizeof(double);
 }
@@ -52,15 +46,16 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     double *d = memory;
     const int e = p + m + n, rows = m + n;
     k->n = n;
-    k->H = take(&d, n * n);
-    k->Z = take(&d, n * n);
-    k->K = take(&d, n * n);
-    k->L = take(&d, n * n);
-    k->T = take(&d, n * n);
-    k->C = take(&d, m * n);
-    k->E = take(&d, e * n);
-    k->E0 = take(&d, e * n);
-    k->M = take(&d, rows * n);
+    k->limit = e;
+    k->hess = take(&d, n * n);
+    k->basis = take(&d, n * n);
+    k->curv = take(&d, n * n);
+    k->chol = take(&d, n * n);
+    k->white = take(&d, n * n);
+    k->rowmat = take(&d, m * n);
+    k->eqfactor = take(&d, e * n);
+    k->eqmat = take(&d, e * n);
+    k->whiterows = take(&d, rows * n);
     k->scale = take(&d, n);
     k->g = take(&d, n);
     k->tau = take(&d, n);
@@ -82,6 +77,11 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     k->lower = take(&d, rows);
     k->upper = take(&d, rows);
     k->rowz = take(&d, rows);
+    k->noise = take(&d, rows);
+    k->slack = take(&d, rows);
+    k->doubt = take(&d, rows);
+    k->offset = take(&d, rows);
+    k->enoise = take(&d, e);
     k->core = d;
     d += core_doubles(n, rows);
     int *i = (int *)(void *)d;
@@ -90,169 +90,8 @@ static void lay_out(kinqp_qp_work *k, int n, int p, int m, void *memory) {
     k->id = take_int(&i, rows);
     k->sign = take_int(&i, rows);
     k->kpivot = take_int(&i, n);
-}
-
-/* v := T'grad. */
-static void whiten_vector(const kinqp_qp_work *k, const double *grad, double *v) {
-    for (int c = 0; c < k->free; ++c) v[c] = 0.0;
-    for (int i = 0; i < k->n; ++i)
-        for (int c = 0; c < k->free; ++c) v[c] += k->T[i * k->free + c] * grad[i];
-}
-
-static double row_value(const kinqp_qp_work *k, int row, int m, const double *x) {
-    const int id = k->id[row];
-    return id < m ? kinqp_qp_dot(k->C + id * k->n, x, k->n) : x[id - m];
-}
-
-/* v := T'(H x + g + rows' duals): what stationarity still misses, in whitened coordinates. The equalities' duals have no
- * share in it but for rounding: they are put in so that large terms cancel entry by entry, before T mixes the entries. */
-static void whitened_residual(kinqp_qp_work *k, int m, const double *x, double *v) {
-    for (int i = 0; i < k->n; ++i) k->grad[i] = k->g[i] + kinqp_qp_dot(k->H + i * k->n, x, k->n);
-    for (int j = 0; j < k->state.k; ++j) {
-        const int row = k->state.rows[j], id = k->id[row];
-        if (id >= m) k->grad[id - m] += k->rowz[row];
-        else for (int i = 0; i < k->n; ++i) k->grad[i] += k->C[id * k->n + i] * k->rowz[row];
-    }
-    for (int i = 0; i < k->n; ++i) k->s[i] = -k->grad[i];
-    kinqp_qp_equality_duals(k, k->s, k->ey);
-    for (int r = 0; r < k->equalities; ++r)
-        for (int i = 0; i < k->n; ++i) k->grad[i] += k->E0[r * k->n + i] * k->ey[r];
-    whiten_vector(k, k->grad, v);
-}
-
-/* x += a Newton step on the face of the core's active set, duals likewise; both as corrections of residuals. */
-static void refine(kinqp_qp_work *k, int m, double *x) {
-    const int f = k->free, active = k->state.k;
-    double *v = k->v, *e = k->state.u, *d = k->state.d;
-    whitened_residual(k, m, x, v);
-    for (int j = 0; j < active; ++j) {
-        const int row = k->state.rows[j];
-        const double value = row_value(k, row, m, x);
-        e[j] = k->state.signs[j] < 0 ? k->lower[row] - value : value - k->upper[row];
-    }
-    for (int j = 0; j < active; ++j) { /* e := R^-T e, d := Q'v */
-        for (int i = 0; i < j; ++i) e[j] -= k->state.r[j * f + i] * e[i];
-        e[j] *= k->state.rinv[j];
-        d[j] = kinqp_qp_dot(k->state.q + j * f, v, f);
-    }
-    for (int i = 0; i < f; ++i) k->w[i] = active < f ? -v[i] : 0.0;
-    for (int j = 0; j < active; ++j)
-        for (int i = 0; i < f; ++i) k->w[i] += k->state.q[j * f + i] * (active < f ? d[j] + e[j] : e[j]);
-    for (int i = 0; i < k->n; ++i) x[i] += kinqp_qp_dot(k->T + i * f, k->w, f);
-    kinqp_qp_restore_equalities(k, x);
-    whitened_residual(k, m, x, v);
-    for (int j = 0; j < active; ++j) d[j] = kinqp_qp_dot(k->state.q + j * f, v, f);
-    for (int j = active - 1; j >= 0; --j) {
-        d[j] *= k->state.rinv[j];
-        for (int i = 0; i < j; ++i) d[i] -= k->state.r[j * f + i] * d[j];
-    }
-    for (int j = 0; j < active; ++j) {
-        const double sign = k->state.signs[j], dual = sign * k->rowz[k->state.rows[j]] + d[j];
-        k->rowz[k->state.rows[j]] = dual > 0.0 ? sign * dual : 0.0;
-    }
-}
-
-static double worst_residual(const kinqp_qp_solution *s) { return fmax(s->primal, fmax(s->dual, s->gap)); }
-
-/* Refines x until the residuals stall; leaves the answer in s and returns its worst residual. */
-static double polish(kinqp_qp_work *k, const kinqp_qp *qp, double *x, kinqp_qp_solution *s) {
-    double before = HUGE_VAL;
-    for (int i = 0; i < KINQP_REFINEMENTS; ++i) {
-        refine(k, qp->m, x);
-        kinqp_qp_recover(k, qp, x, 0, s);
-        kinqp_qp_residuals(qp, k->scale, s);
-        const double now = worst_residual(s);
-        if (now <= 1e-13 || !(now < 0.5 * before)) return now;
-        before = now;
-    }
-    return before;
-}
-
-/* The curvature that proximal weights are relative to: H's, or for a linear cost one that makes steps of data size. */
-static double curvature(const kinqp_qp_work *k) {
-    double largest = 0.0, reach = 1.0, slope = 0.0;
-    for (int i = 0; i < k->free; ++i) largest = fmax(largest, k->K[i * k->free + i]);
-    if (largest > 1e-12) return largest; /* the scaled Hessian has a unit diagonal or none */
-    for (int r = 0; r < k->rows; ++r) {
-        if (fabs(k->lower[r]) <= DBL_MAX) reach = fmax(reach, fabs(k->lower[r]));
-        if (fabs(k->upper[r]) <= DBL_MAX) reach = fmax(reach, fabs(k->upper[r]));
-    }
-    for (int i = 0; i < k->n; ++i) slope = fmax(slope, fabs(k->g[i]));
-    return slope > 0.0 ? slope / reach : 1.0;
-}
-
-/* Bounds of the whitened rows and the target (in centre) about the iterate; returns the iterate's whitened length. */
-static double recentre(kinqp_qp_work *k, int m, double shift) {
-    double size = 0.0;
-    for (int i = 0; i < k->n; ++i) {
-        const double pull = kinqp_qp_dot(k->H + i * k->n, k->x, k->n);
-        k->grad[i] = k->g[i] + pull;
-        size += k->x[i] * (pull + shift * k->x[i]);
-    }
-    whiten_vector(k, k->grad, k->centre);
-    for (int c = 0; c < k->free; ++c) k->centre[c] = -k->centre[c];
-    for (int r = 0; r < k->rows; ++r) {
-        const double value = row_value(k, r, m, k->x);
-        k->lo[r] = k->lower[r] - value;
-        k->hi[r] = k->upper[r] - value;
-    }
-    return size > 0.0 ? sqrt(size) : 0.0;
-}
-
-/* Outer passes on the reduced problem. */
-static kinqp_status passes(kinqp_qp_work *k, const kinqp_qp *qp, const kinqp_qp_options *o, double shift,
-                           kinqp_qp_solution *s) {
-    const int n = k->n, m = qp->m;
-    kinqp_as_options core = kinqp_as_default_options(k->free, k->rows);
-    kinqp_as_result result;
-    int met = 0; /* passes that met the tolerance, but without margin */
-    core.warm = o->warm;
-    for (s->passes = 1; s->passes <= o->max_passes; ++s->passes) {
-        core.scale = recentre(k, m, shift);
-        /* The target is T'grad: what the equalities leave of a large gradient is exact to rounding of the whole. */
-        core.scale = fmax(core.scale, KINQP_GRADIENT_SHARE * sqrt(kinqp_qp_dot(k->grad, k->grad, n)));
-        core.max_iterations = o->max_iterations - s->iterations;
-        const kinqp_status status =
-            kinqp_as_solve(&k->state, k->M, k->lo, k->hi, k->centre, NULL, &core, k->w, k->rowz, k->sign, &result);
-        s->iterations += result.iterations;
-        core.warm = 1;
-        if (status == KINQP_FAILED) return status;
-        if (status == KINQP_PRIMAL_INFEASIBLE) {
-            kinqp_qp_recover(k, qp, k->x, 1, s);
-            return kinqp_qp_proves_infeasible(qp, s) ? status : KINQP_INACCURATE;
-        }
-        for (int i = 0; i < n; ++i) {
-            k->last[i] = k->x[i];
-            k->x[i] += kinqp_qp_dot(k->T + i * k->free, k->w, k->free);
-            k->trial[i] = k->x[i];
-        }
-        if (status == KINQP_MAX_ITERATIONS) {
-            kinqp_qp_recover(k, qp, k->x, 0, s);
-            kinqp_qp_residuals(qp, k->scale, s);
-            return status;
-        }
-        const double worst = polish(k, qp, k->trial, s);
-        const double share = shift > 0.0 && met < KINQP_MARGIN_PASSES ? KINQP_MARGIN : 1.0;
-        if (worst <= share * o->tolerance) return KINQP_SOLVED;
-        met += worst <= o->tolerance;
-        if (shift <= 0.0) {
-            if (s->passes >= 3) return KINQP_INACCURATE;
-            continue;
-        }
-        if (s->passes > 1) {
-            for (int i = 0; i < n; ++i) k->s[i] = k->scale[i] * (k->x[i] - k->last[i]);
-            if (kinqp_qp_proves_unbounded(qp, k->s)) {
-                for (int i = 0; i < n; ++i) s->x[i] = k->s[i];
-                return KINQP_DUAL_INFEASIBLE;
-            }
-        }
-        if (s->passes % KINQP_PASSES_PER_WEIGHT == 0) {
-            shift *= 0.01;
-            if (!(kinqp_qp_cholesky(k, shift) > 0.0)) return KINQP_INACCURATE;
-            kinqp_qp_whiten(k, m);
-        }
-    }
-    return KINQP_INACCURATE;
+    /* The sizes taken are those that kinqp_qp_workspace_size adds up. */
+    KINQP_ASSERT((char *)i <= (char *)memory + kinqp_qp_workspace_size(n, p, m));
 }
 
 static void clear(const kinqp_qp *qp, kinqp_qp_solution *s) {
@@ -274,15 +113,17 @@ kinqp_status kinqp_qp_solve(const kinqp_qp *qp, const kinqp_qp_options *o, void 
     if (status == KINQP_SOLVED) status = kinqp_qp_reduce(k, qp, s);
     if (status != KINQP_SOLVED) return status;
     for (int r = 0; r < k->rows; ++r) k->sign[r] = o->warm ? s->active[k->id[r]] : 0;
-    kinqp_as_setup(&k->state, k->free, k->rows, k->core);
+    KINQP_ASSERT(k->rank >= 0 && k->rank <= k->n && k->rank <= k->equalities && k->free == k->n - k->rank);
+    KINQP_ASSERT(k->rows >= 0 && k->rows <= qp->m + qp->n && k->equalities + k->rows <= k->limit);
+    kinqp_as_setup(&k->state, k->free, k->rows, k->core); /* in memory for n columns and m + n rows: enough for fewer */
     const double ratio = kinqp_qp_cholesky(k, 0.0);
     if (!(ratio >= -KINQP_CONVEX_TOLERANCE)) return KINQP_FAILED;
     if (ratio < KINQP_FLAT) {
-        shift = KINQP_PROXIMAL * curvature(k);
+        shift = KINQP_PROXIMAL * kinqp_qp_curvature(k);
         if (!(kinqp_qp_cholesky(k, shift) > 0.0)) return KINQP_FAILED;
     }
     kinqp_qp_whiten(k, qp->m);
-    status = passes(k, qp, o, shift, s);
+    status = kinqp_qp_passes(k, qp, o, shift, s);
     if (status == KINQP_FAILED) clear(qp, s);
     return status;
 }

@@ -46,7 +46,9 @@ typedef struct {
     int *active;     /* out (m + n,): -1, 0, +1 for the rows of C, then the box; in if warm [sign] */
     int iterations;  /* out: active-set steps over all passes [count] */
     int passes;      /* out: outer passes [count] */
-    double primal;   /* out: largest violation of a row, relative to its bound or its reach at x's length [-] */
+    double primal;   /* out: largest violation of a row, relative to its bound or its terms, whichever is more, but to no
+                      * less than the row at a ten-thousandth of a unit of x or, where data contradict themselves by
+                      * noise, at four units; infinite: rows contradict each other, but not provably [-] */
     double dual;         /* out: largest stationarity residual in scaled variables, relative to the largest terms; or,
                           * where worse, 2e-3 of it as given, relative to the largest of |H|, |Hx|, |g|, |A'y..| [-] */
     double gap;      /* out: largest complementarity product, relative to the largest term of the objective [-] */
@@ -62,11 +64,13 @@ size_t kinqp_qp_workspace_size(int n, int p, int m);
 kinqp_status kinqp_qp_solve(const kinqp_qp *qp, const kinqp_qp_options *options, void *memory,
                             kinqp_qp_solution *solution);
 
-/* Fills solution->primal, dual and gap from x, y, z, z_box and the data alone. scale: unit of each variable (n,),
- * NULL: all 1; kinqp_qp_solve uses 1 / sqrt(H_jj), or 1 / the column's largest entry where H_jj is 0. */
+/* Fills solution->primal, dual and gap from x, y, z, z_box and the data alone, small rows at four units of x. scale: unit
+ * of each variable (n,), NULL: all 1; kinqp_qp_solve uses 1 / sqrt(H_jj), or where H_jj is 0 one over the column's largest
+ * entry once rows are brought to one size. */
 void kinqp_qp_residuals(const kinqp_qp *qp, const double *scale, kinqp_qp_solution *solution);
 
-/* 1 if y, z, z_box prove that no point is feasible: A'y + C'z + z_box = 0 with a negative support value. */
+/* 1 if y, z, z_box prove that no point is feasible: A'y + C'z + z_box = 0 with a support value that is negative by more
+ * than what the bounds may be off by: 1e-9 of each, or 4e-9 times its row's entries. */
 int kinqp_qp_proves_infeasible(const kinqp_qp *qp, const kinqp_qp_solution *solution);
 
 /* 1 if the direction proves that the cost is unbounded below: H d = 0, g'd < 0, and d leaves no row. */

@@ -1,5 +1,4 @@
 /* Dense factorisations of the front end: pivoted Householder for the equalities, pivoted Cholesky for the Hessian. */
-#include <float.h>
 #include <math.h>
 
 #include "kinqp_qp_internal.h"
@@ -9,7 +8,7 @@
 
 double kinqp_qp_power(double value) {
     int exponent;
-    if (!(value > 0.0) || !(value <= DBL_MAX)) return 1.0;
+    if (!(value > 0.0) || !kinqp_qp_is_finite(value)) return 1.0;
     (void)frexp(value, &exponent);
     return ldexp(1.0, 1 - exponent);
 }
@@ -20,9 +19,15 @@ double kinqp_qp_dot(const double *a, const double *b, int n) {
     return sum;
 }
 
+double kinqp_qp_entries(const double *row, int n) {
+    double sum = 0.0;
+    for (int j = 0; j < n; ++j) sum += fabs(row[j]);
+    return sum;
+}
+
 /* v := (I - tau h h') v for the reflector j, whose first entry is 1 and not stored. */
 static void reflect(const kinqp_qp_work *k, int j, double *v) {
-    const double *h = k->E + k->pivot[j] * k->n;
+    const double *h = k->eqfactor + k->pivot[j] * k->n;
     double sum = v[j];
     for (int i = j + 1; i < k->n; ++i) sum += h[i] * v[i];
     sum *= k->tau[j];
@@ -38,7 +43,7 @@ void kinqp_qp_factor_equalities(kinqp_qp_work *k) {
         int best = -1;
         double top = KINQP_RANK_TOLERANCE * KINQP_RANK_TOLERANCE;
         for (int i = j; i < count; ++i) {
-            const double *row = k->E + k->pivot[i] * n;
+            const double *row = k->eqfactor + k->pivot[i] * n;
             const double left = kinqp_qp_dot(row + j, row + j, n - j);
             if (left > top) {
                 top = left;
@@ -46,10 +51,11 @@ void kinqp_qp_factor_equalities(kinqp_qp_work *k) {
             }
         }
         if (best < 0) return;
+        KINQP_ASSERT(j < n && best >= j && best < count); /* the loop ends at n: rank <= n */
         const int chosen = k->pivot[best];
         k->pivot[best] = k->pivot[j];
         k->pivot[j] = chosen;
-        double *h = k->E + chosen * n;
+        double *h = k->eqfactor + chosen * n;
         const double length = sqrt(top), first = h[j];
         const double diagonal = first > 0.0 ? -length : length;
         const double head = first - diagonal;
@@ -58,7 +64,7 @@ void kinqp_qp_factor_equalities(kinqp_qp_work *k) {
         for (int i = j + 1; i < n; ++i) h[i] /= head;
         h[j] = diagonal;
         k->rank = j + 1;
-        for (int i = j + 1; i < count; ++i) reflect(k, j, k->E + k->pivot[i] * n);
+        for (int i = j + 1; i < count; ++i) reflect(k, j, k->eqfactor + k->pivot[i] * n);
     }
 }
 
@@ -74,7 +80,7 @@ void kinqp_qp_equality_duals(const kinqp_qp_work *k, double *v, double *ey) {
     for (int i = 0; i < k->equalities; ++i) ey[i] = 0.0;
     kinqp_qp_apply_transposed(k, v);
     for (int j = k->rank - 1; j >= 0; --j) {
-        const double *column = k->E + k->pivot[j] * k->n;
+        const double *column = k->eqfactor + k->pivot[j] * k->n;
         const double value = v[j] / k->diagonal[j];
         ey[k->pivot[j]] = value;
         for (int i = 0; i < j; ++i) v[i] -= column[i] * value;
@@ -83,63 +89,62 @@ void kinqp_qp_equality_duals(const kinqp_qp_work *k, double *v, double *ey) {
 
 void kinqp_qp_restore_equalities(const kinqp_qp_work *k, double *x) {
     double *t = k->v;
-    for (int i = 0; i < k->n; ++i) t[i] = x[i];
-    kinqp_qp_apply_transposed(k, t);
-    for (int j = 0; j < k->rank; ++j) {
-        const double *column = k->E + k->pivot[j] * k->n;
-        double value = k->e[k->pivot[j]];
+    for (int i = 0; i < k->n; ++i) t[i] = 0.0;
+    for (int j = 0; j < k->rank; ++j) { /* rank <= n: the factorisation takes one of n columns a time */
+        const double *column = k->eqfactor + k->pivot[j] * k->n;
+        double value = k->e[k->pivot[j]] - kinqp_qp_dot(k->eqmat + k->pivot[j] * k->n, x, k->n);
         for (int i = 0; i < j; ++i) value -= column[i] * t[i];
         t[j] = value / k->diagonal[j];
     }
     kinqp_qp_apply(k, t);
-    for (int i = 0; i < k->n; ++i) x[i] = t[i];
+    for (int i = 0; i < k->n; ++i) x[i] += t[i];
 }
 
 double kinqp_qp_cholesky(kinqp_qp_work *k, double shift) {
     const int n = k->free;
-    double *L = k->L, largest = 0.0, smallest = HUGE_VAL, reference = 0.0;
+    double *chol = k->chol, largest = 0.0, smallest = HUGE_VAL, reference = 0.0;
     for (int i = 0; i < n; ++i) {
         k->kpivot[i] = i;
-        for (int j = 0; j < n; ++j) L[i * n + j] = k->K[i * n + j];
-        L[i * n + i] += shift;
-        if (L[i * n + i] > largest) largest = L[i * n + i];
+        for (int j = 0; j < n; ++j) chol[i * n + j] = k->curv[i * n + j];
+        chol[i * n + i] += shift;
+        if (chol[i * n + i] > largest) largest = chol[i * n + i];
     }
     if (shift <= 0.0) /* against the whole Hessian: what is left of it may be rounding alone */
-        for (int i = 0; i < k->n; ++i) reference = fmax(reference, k->H[i * k->n + i]);
+        for (int i = 0; i < k->n; ++i) reference = fmax(reference, k->hess[i * k->n + i]);
     reference = fmax(reference, largest);
     for (int j = 0; j < n; ++j) {
         int best = j;
         for (int i = j + 1; i < n; ++i)
-            if (L[i * n + i] > L[best * n + best]) best = i;
-        const double pivot = L[best * n + best];
+            if (chol[i * n + i] > chol[best * n + best]) best = i;
+        const double pivot = chol[best * n + best];
         if (pivot < smallest) smallest = pivot;
         for (int i = j; i < n; ++i)
-            if (L[i * n + i] < smallest) smallest = L[i * n + i];
+            if (chol[i * n + i] < smallest) smallest = chol[i * n + i];
         if (!(pivot > KINQP_PIVOT_NOISE * largest)) return reference > 0.0 ? smallest / reference : smallest;
         if (best != j) {
             const int swap = k->kpivot[j];
             k->kpivot[j] = k->kpivot[best];
             k->kpivot[best] = swap;
             for (int c = 0; c < n; ++c) { /* rows, then columns, of the full square */
-                const double a = L[j * n + c];
-                L[j * n + c] = L[best * n + c];
-                L[best * n + c] = a;
+                const double a = chol[j * n + c];
+                chol[j * n + c] = chol[best * n + c];
+                chol[best * n + c] = a;
             }
             for (int r = 0; r < n; ++r) {
-                const double a = L[r * n + j];
-                L[r * n + j] = L[r * n + best];
-                L[r * n + best] = a;
+                const double a = chol[r * n + j];
+                chol[r * n + j] = chol[r * n + best];
+                chol[r * n + best] = a;
             }
         }
         const double root = sqrt(pivot), inverse = 1.0 / root;
-        L[j * n + j] = root;
-        for (int i = j + 1; i < n; ++i) L[i * n + j] *= inverse;
+        chol[j * n + j] = root;
+        for (int i = j + 1; i < n; ++i) chol[i * n + j] *= inverse;
         for (int i = j + 1; i < n; ++i) {
-            const double a = L[i * n + j];
-            for (int c = j + 1; c <= i; ++c) L[i * n + c] -= a * L[c * n + j];
-            for (int c = j + 1; c < i; ++c) L[c * n + i] = L[i * n + c];
+            const double a = chol[i * n + j];
+            for (int c = j + 1; c <= i; ++c) chol[i * n + c] -= a * chol[c * n + j];
+            for (int c = j + 1; c < i; ++c) chol[c * n + i] = chol[i * n + c];
         }
-        for (int c = j + 1; c < n; ++c) L[j * n + c] = 0.0;
+        for (int c = j + 1; c < n; ++c) chol[j * n + c] = 0.0;
     }
     return n > 0 ? smallest / reference : 1.0;
 }
@@ -147,25 +152,25 @@ double kinqp_qp_cholesky(kinqp_qp_work *k, double shift) {
 void kinqp_qp_whiten(kinqp_qp_work *k, int m) {
     const int n = k->n, f = k->free;
     for (int i = 0; i < n; ++i) {
-        double *t = k->T + i * f;
+        double *t = k->white + i * f;
         for (int j = 0; j < f; ++j) {
-            const double *row = k->L + j * f;
-            double value = k->Z[i * f + k->kpivot[j]];
+            const double *row = k->chol + j * f;
+            double value = k->basis[i * f + k->kpivot[j]];
             for (int c = 0; c < j; ++c) value -= row[c] * t[c];
             t[j] = value / row[j];
         }
     }
     for (int r = 0; r < k->rows; ++r) {
-        double *row = k->M + r * f;
+        double *row = k->whiterows + r * f;
         if (k->id[r] >= m) {
-            const double *t = k->T + (k->id[r] - m) * f;
+            const double *t = k->white + (k->id[r] - m) * f;
             for (int j = 0; j < f; ++j) row[j] = t[j];
             continue;
         }
-        const double *c = k->C + k->id[r] * n;
+        const double *c = k->rowmat + k->id[r] * n;
         for (int j = 0; j < f; ++j) row[j] = 0.0;
         for (int i = 0; i < n; ++i)
             if (c[i] != 0.0)
-                for (int j = 0; j < f; ++j) row[j] += c[i] * k->T[i * f + j];
+                for (int j = 0; j < f; ++j) row[j] += c[i] * k->white[i * f + j];
     }
 }

@@ -2,6 +2,17 @@
 #ifndef KINQP_STATUS_H
 #define KINQP_STATUS_H
 
+/* The code's own assumptions, above all that indices are within their arrays: checked where KINQP_DEBUG is defined, and
+ * not there otherwise. */
+#ifndef KINQP_ASSERT
+#ifdef KINQP_DEBUG
+#include <assert.h>
+#define KINQP_ASSERT(condition) assert(condition)
+#else
+#define KINQP_ASSERT(condition) ((void)0)
+#endif
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif

@@ -15,18 +15,28 @@ _RUN_TIME = (
     "kinqp_as.h",
     "kinqp_as.c",
     "kinqp_as_factor.inc",
+    "kinqp_as_steps.inc",
     "kinqp_as_core.inc",
     "kinqp_as_primal.inc",
     "kinqp_qp.h",
     "kinqp_qp_internal.h",
     "kinqp_qp.c",
     "kinqp_qp_factor.c",
+    "kinqp_qp_passes.c",
     "kinqp_qp_reduce.c",
     "kinqp_qp_residual.c",
+    "kinqp_qp_scale.c",
 )
 
 #: The least-distance core alone, sizes known at compile time: all to be included, nothing to be compiled by itself.
-_FIXED_SIZE = ("kinqp_status.h", "kinqp_as.h", "kinqp_as_fixed.h", "kinqp_as_factor.inc", "kinqp_as_core.inc")
+_FIXED_SIZE = (
+    "kinqp_status.h",
+    "kinqp_as.h",
+    "kinqp_as_fixed.h",
+    "kinqp_as_factor.inc",
+    "kinqp_as_steps.inc",
+    "kinqp_as_core.inc",
+)
 
 _HEADERS = ("kinqp_status.h", "kinqp_as.h", "kinqp_qp.h")
 

@@ -125,16 +125,16 @@ class ActiveSet(Solver):
         np.copyto(self._lower, qp.lower)
         np.copyto(self._upper, qp.upper)
 
-    def _solve(self, qp: QP) -> RawSolution:
+    def _solve(self, qp: QP) -> RawSolution:  # noqa: ARG002  # the interface has it; its data are in the buffers
         answer = self._answer
         claimed = STATUSES[self._call(self._problem, self._options, self._memory, answer)]
         if claimed is Status.SOLVED:
             return RawSolution(
                 claimed=claimed, x=self._x, y=self._y, z=self._z, z_box=self._z_box, iterations=answer.iterations
             )
-        return self._unsolved(qp, claimed)
+        return self._unsolved(claimed)
 
-    def _unsolved(self, qp: QP, claimed: Status) -> RawSolution:
+    def _unsolved(self, claimed: Status) -> RawSolution:
         answer = self._answer
         if claimed is Status.FAILED:
             return RawSolution(
@@ -142,11 +142,10 @@ class ActiveSet(Solver):
                 iterations=answer.iterations,
                 message="The data hold NaN, an infinity or an impossible bound, or H is not symmetric or not convex.",
             )
-        crossed = bool((qp.lower > qp.upper).any())
         certificate: FarkasCertificate | UnboundedRay | None = None
         message = "The problem is unbounded below."
-        if claimed is Status.PRIMAL_INFEASIBLE and crossed:
-            # What two multipliers of opposite sign would prove, one multiplier per row cannot say.
+        if claimed is Status.PRIMAL_INFEASIBLE and not self._multipliers.any():
+            # Bounds that cross. What two multipliers of opposite sign would prove, one multiplier per row cannot say.
             message = "A lower bound lies above its upper bound."
         elif claimed is Status.PRIMAL_INFEASIBLE:
             certificate = FarkasCertificate(self._y.copy(), self._z.copy(), self._z_box.copy())
@@ -155,6 +154,11 @@ class ActiveSet(Solver):
             certificate = UnboundedRay(self._x.copy())
         elif claimed is Status.MAX_ITERATIONS:
             message = f"No convergence within {self._options.max_iterations} iterations."
+        elif not (answer.primal < np.inf):
+            message = (
+                "The rows seem to contradict each other, but by so little beside the rounding in them that it could "
+                "not be proved; no point was found that satisfies them either."
+            )
         else:
             message = (
                 f"After {answer.passes} passes the relative residuals are primal {answer.primal:.1e}, "

@@ -8,6 +8,8 @@ import numpy as np
 from kinqp.solvers import QP
 
 PROOF = 1e-7
+#: Rounding next to zero is relative to each x at this size, at least [unit of x].
+LEAST = 1e-4
 
 
 def optimality(qp: QP, x: np.ndarray, y: np.ndarray, z: np.ndarray, z_box: np.ndarray) -> float:
@@ -17,7 +19,9 @@ def optimality(qp: QP, x: np.ndarray, y: np.ndarray, z: np.ndarray, z_box: np.nd
     unit = _units(qp)
     multipliers = np.concatenate((y, z, z_box))
     pull = qp.stacked.T @ multipliers
-    products = unit * (np.abs(qp.H) @ np.abs(x) + np.abs(qp.g) + np.abs(qp.stacked).T @ np.abs(multipliers))
+    products = unit * (
+        np.abs(qp.H) @ np.maximum(np.abs(x), LEAST) + np.abs(qp.g) + np.abs(qp.stacked).T @ np.abs(multipliers)
+    )
     stationarity = _ratio(np.abs(unit * (qp.H @ x + qp.g + pull)).max(), products.max())
 
     value, reach = qp.stacked @ x, _reach(qp, x, unit)
@@ -73,7 +77,7 @@ def _units(qp: QP) -> np.ndarray:
 
 def _reach(qp: QP, x: np.ndarray, unit: np.ndarray) -> np.ndarray:
     length = max(np.abs(x / unit).max(), np.where(np.diag(qp.H) > 0, np.abs(qp.g * unit), 0).max())
-    reach: np.ndarray = np.abs(qp.stacked) @ unit * length
+    reach: np.ndarray = np.abs(qp.stacked) @ np.maximum(unit * length, LEAST)
     return reach
 
 

@@ -20,8 +20,6 @@ GIVING_UP = (Status.INACCURATE, Status.FAILED, Status.MAX_ITERATIONS)
 GIVEN_UP = {
     # Bounded only by a row of 1e-16, the rounding of a combination of others: the minimiser lies at 1e16.
     (6, 9309): Status.INACCURATE,
-    # A diagonal Hessian over 1e8 with dependent equalities: 1.6e-9 is reached.
-    (9, 9148): Status.INACCURATE,
 }
 
 

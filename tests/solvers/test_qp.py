@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 from kinqp.solvers import QP, QPError
 
@@ -69,6 +70,42 @@ def test_every_defect_is_refused_in_one_sentence(change: dict[str, Any], message
     text = str(caught.value)
     assert text.endswith(".")
     assert "\n" not in text
+
+
+@pytest.mark.parametrize("field", ["H", "A", "C"])
+def test_sparse_matrices_are_refused_with_the_remedy(field: str) -> None:
+    with pytest.raises(
+        QPError, match=rf"{field} must be a dense array, but is a sparse csc_matrix: give {field}.toarray"
+    ):
+        QP(**(GOOD | {field: sparse.csc_matrix(np.array(GOOD[field], dtype=float))}))
+
+
+def test_empty_lists_have_no_rows() -> None:
+    for fields in ({"A": []}, {"A": [], "b": []}, {"C": []}, {"C": [], "l": [], "u": []}):
+        qp = QP(H=np.eye(2), g=[0, 0], **fields)
+        assert qp.A.shape == qp.C.shape == (0, 2)
+
+
+def test_single_precision_is_allowed_its_rounding() -> None:
+    """A Gram matrix of rank 3 in float32: neither symmetric nor semidefinite to double precision."""
+    root = np.random.default_rng(2).normal(size=(3, 6)).astype(np.float32)
+    gram = root.T @ root
+    gram[0, 1] *= np.float32(1 + 3e-7)
+    qp = QP(H=gram, g=np.zeros(6))
+    np.testing.assert_array_equal(qp.H, qp.H.T)
+    assert np.linalg.eigvalsh(qp.H)[0] > -1e-14
+    np.testing.assert_allclose(qp.H, gram, atol=1e-5)
+    with pytest.raises(QPError, match="if it was computed in single precision, give it as float32"):
+        QP(H=gram.astype(float), g=np.zeros(6))
+
+
+def test_bounds_that_cross_by_rounding_become_one() -> None:
+    above = np.nextafter(0.3, 1)
+    qp = QP(H=np.eye(1), g=[1], C=[[1]], l=[above], u=[0.3], lb=[above], ub=[0.3])
+    assert qp.l == qp.u
+    assert qp.lb == qp.ub
+    with pytest.raises(QPError, match="lb must not exceed ub"):
+        QP(H=np.eye(1), g=[1], lb=[0.3 + 1e-9], ub=[0.3])
 
 
 def test_error_is_a_value_error() -> None:

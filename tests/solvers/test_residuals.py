@@ -83,7 +83,9 @@ def test_a_row_of_zeros() -> None:
     possible = QP(H=np.eye(1), g=[0], C=[[0]], l=[0], u=[0])
     assert residuals(possible, vec(0), NONE, vec(0), vec(0)).worst_scaled == 0
     impossible = QP(H=np.eye(1), g=[0], C=[[0]], l=[1], u=[2])
-    assert residuals(impossible, vec(0), NONE, vec(0), vec(0)).primal_scaled > 1e6
+    assert residuals(impossible, vec(0), NONE, vec(0), vec(0)).primal_scaled == 1
+    rounding = QP(H=np.eye(1), g=[0], C=[[0]], u=[-7e-18])
+    assert residuals(rounding, vec(0), NONE, vec(0), vec(0)).worst_scaled < 1e-16
 
 
 def test_zero_cost_is_no_division_by_zero() -> None:
@@ -111,3 +113,12 @@ def test_dual_infeasibility_certificates() -> None:
         assert not is_dual_infeasibility_certificate(qp, wrong)
     closed = QP(H=np.diag([1, 0]), g=[0, -1], ub=[INF, 9])
     assert not is_dual_infeasibility_certificate(closed, vec(0, 1))
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_a_ray_is_one_in_any_units(unit: float) -> None:
+    """Two variables grow together without end, one of them in another unit."""
+    qp = QP(H=np.zeros((2, 2)), g=[-1, 0], A=[[1, -unit]], b=[0], lb=[0, 0])
+    assert is_dual_infeasibility_certificate(qp, vec(1, 1 / unit))
+    assert not is_dual_infeasibility_certificate(qp, vec(-1, -1 / unit))
+    assert not is_dual_infeasibility_certificate(qp, vec(1, 2 / unit))

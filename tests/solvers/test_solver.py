@@ -1,5 +1,7 @@
 """What holds for every solver: judgement, set-up and update, failures, determinism."""
 
+import copy
+import pickle
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -16,6 +18,7 @@ from kinqp.solvers import (
     UnboundedRay,
     available_solvers,
     get_solver,
+    solve,
 )
 from kinqp.solvers.catalogue import CATALOGUE
 
@@ -234,3 +237,28 @@ def test_answers_outlive_the_next_solve(name: str) -> None:
     before = first.x.copy()
     solver.solve(control_problem(1))
     np.testing.assert_array_equal(first.x, before)
+
+
+@pytest.mark.parametrize("name", [*available_solvers(), "qpsolvers:daqp", "cvxpy:CLARABEL"])
+def test_copies_and_pickles_are_new_solvers_with_the_same_options(name: str) -> None:
+    solver = get_solver(name, tolerance=1e-7)
+    first = solver.solve(BOX)
+    for other in (copy.deepcopy(solver), copy.copy(solver), pickle.loads(pickle.dumps(solver))):  # noqa: S301 - our own
+        assert type(other) is type(solver)
+        assert other is not solver
+        assert other.tolerance == solver.tolerance
+        again = other.solve(BOX)
+        assert not again.updated
+        assert again.x.tobytes() == first.x.tobytes()
+
+
+def test_what_is_no_qp_is_refused_in_one_sentence() -> None:
+    with pytest.raises(TypeError, match=r"qp: expected a QP, got dict; make one as QP\(H=..., g=...\)"):
+        solve({"H": np.eye(1), "g": np.zeros(1)})  # type: ignore[arg-type]  # that is the point
+
+
+@pytest.mark.parametrize("status", [Status.PRIMAL_INFEASIBLE, Status.DUAL_INFEASIBLE, Status.FAILED])
+def test_a_claim_without_words_gets_some(status: Status) -> None:
+    message = Scripted(lambda _: RawSolution(claimed=status)).solve(BOX).message
+    assert status.value in message
+    assert ("offers no proof" in message) == (status is not Status.FAILED)
