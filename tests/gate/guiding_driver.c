@@ -1,7 +1,7 @@
-/* Runs and judges the hand-guiding controller: driver TICKS SEED guiding. The arm goes where it is sent; what is judged
+/* Runs and judges the hand-guiding controller: driver TICKS SEED guiding BROKEN. The arm goes where it is sent; what is judged
  * is what it was sent, from this program's own record of it.
  *
- * BREAK, for the test of the judge itself: what is done to ticks before they are judged.
+ * BROKEN, for the test of the judge itself, is the kind of damage done to ticks before they are judged; 0: none.
  */
 #include HEADER
 
@@ -12,9 +12,6 @@
 
 #include <stdlib.h>
 
-#ifndef BREAK
-#define BREAK 0
-#endif
 #define SETTINGS ((int)(sizeof settings / sizeof *settings))
 
 static P(_guiding_parameters) usual, parameters;
@@ -22,6 +19,7 @@ static P(_guiding_state) state;
 static P(_guiding_input) input;
 static P(_guiding_output) output;
 static long usable_ticks, stopped_ticks;
+static int broken;
 
 /* What was sent last and where the arm was then; what was last good. */
 static struct {
@@ -134,8 +132,12 @@ static void judge(const P(_guiding_state) *before) {
         if (output.mode >= 0 && output.mode < MODES && all_finite(NV, output.qd)) judge_drift(output.mode, q, output.qd);
     } else {
         ++stopped_ticks;
-        if (output.status == KINQP_SOLVED) found(WRONG_STATUS, output.status, output.stop);
         judge_stop(&at, output.qd, record.qd, 0);
+        /* What still moves when the hand's velocity is zero is braked and called solved: limits are kept, even then. */
+        if (output.status == KINQP_SOLVED) {
+            if (output.phase == 0 || output.iterations) found(WRONG_STATUS, output.status, output.stop);
+            judge_usable(&at, output.mode, output.qd, NULL, record.qd);
+        }
     }
     /* Velocity limits are on their way to those that are set. */
     for (int i = 0; i < NV && !bad; ++i) {
@@ -152,20 +154,12 @@ static void judge(const P(_guiding_state) *before) {
 /* Makes a tick wrong that was right; the judge must see it. */
 static void damage(void) {
     const int moves = output.status == KINQP_SOLVED;
-#if BREAK == 1
-    if (moves) output.qd[0] = state.qd[0] = NAN;
-#elif BREAK == 2
-    if (output.stop == KINQP_STOP_BRAKING && record.qd[0] > 0.0) output.qd[0] = state.qd[0] = record.qd[0] - state.qdd_max[0] * state.dt - 1e-6;
-#elif BREAK == 3
-    if (!moves) state.wrench[3] = NAN;
-#elif BREAK == 4
-    if (output.status == KINQP_BAD_PARAMETER) state.qd_limit[0] = 0.5 * state.qd_limit[0];
-#elif BREAK == 5
-    if (moves) output.qd[1] = state.qd[1] = copysign(state.qd_limit[1] + 1e-6, record.qd[1]);
-#elif BREAK == 6
-    if (output.held > parameters.hold_ticks) output.status = KINQP_SOLVED, output.stop = KINQP_STOP_NONE;
-#endif
-    (void)moves;
+    if (broken == 1 && moves) output.qd[0] = state.qd[0] = NAN;
+    if (broken == 2 && output.stop == KINQP_STOP_BRAKING && record.qd[0] > 0.0) output.qd[0] = state.qd[0] = record.qd[0] - state.qdd_max[0] * state.dt - 1e-6;
+    if (broken == 3 && !moves) state.wrench[3] = NAN;
+    if (broken == 4 && output.status == KINQP_BAD_PARAMETER) state.qd_limit[0] = 0.5 * state.qd_limit[0];
+    if (broken == 5 && moves) output.qd[1] = state.qd[1] = copysign(state.qd_limit[1] + 1e-6, record.qd[1]);
+    if (broken == 6 && output.held > parameters.hold_ticks) output.status = KINQP_SOLVED, output.stop = KINQP_STOP_NONE;
 }
 
 static long history(void) {
@@ -220,9 +214,10 @@ static long history(void) {
 }
 
 int main(int count, char **arguments) {
-    if (count != 4) return 2;
+    if (count != 5) return 2;
     const long ticks = atol(arguments[1]);
     long done = 0;
+    broken = atoi(arguments[4]);
     seed_state = (uint64_t)strtoull(arguments[2], NULL, 10);
     P(_default_guiding)(&usual);
     while (done < ticks) done += history();

@@ -66,9 +66,19 @@ class Program:
 
     path: Path
 
-    def __call__(self, ticks: int, seed: int, how: str = "step") -> Verdict:
-        """Run and judge so many ticks: "step", "batch", "guide" (blended modes) or "guiding"."""
-        command = [self.path, str(ticks), str(seed), how]
+    def __call__(self, ticks: int, seed: int, how: str, *, broken: int = 0) -> Verdict:
+        """Run and judge so many ticks.
+
+        Parameters
+        ----------
+        ticks, seed : int
+            At least so many; of the random numbers.
+        how : {"step", "batch", "guide", "guiding"}
+            "guide": blended modes.
+        broken : int
+            Kind of damage done to ticks before they are judged; 0: none.
+        """
+        command = [self.path, str(ticks), str(seed), how, str(broken)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stderr}"
         return Verdict(**json.loads(done.stdout), first=done.stderr)
@@ -81,7 +91,6 @@ def build(
     robot: str = "lbr_med14",
     *,
     guiding: bool = False,
-    damage: int = 0,
     flags: Sequence[str] = (),
 ) -> Program:
     """Export a formulation, and compile it with a driver.
@@ -89,12 +98,10 @@ def build(
     Parameters
     ----------
     folder : Path
-        An empty one; or that of an earlier call that differs in `damage` only, whose objects are used again.
+        An empty one.
     formulation, modes, robot : str
     guiding : bool
         The whole hand-guiding controller, not the step.
-    damage : int
-        Kind of damage done to ticks before they are judged; 0: none.
     flags : sequence of str
         For the compiler, in addition.
     """
@@ -113,14 +120,9 @@ def build(
     header = f"{PREFIX}_guiding.h" if guiding else f"{PREFIX}.h"
     own = [flag for flag in STEP_FLAGS if flag not in ("-fPIC", "-shared", "-lm")]
     common = [*compiler(), *own, *flags, "-D_GNU_SOURCE", f"-DPREFIX={PREFIX}", f'-DHEADER="{header}"', "-I."]
-    for name in sorted(name for name in files if name.endswith(".c")):
-        made = Path(name).with_suffix(".o").name
-        if name != driver and (folder / made).exists():
-            continue
-        _run([*common, f"-DBREAK={damage}", "-c", name, "-o", made], folder)
-    objects = sorted(path.name for path in folder.glob("*.o"))
-    _run([*common, *objects, "-o", f"driver{damage}", "-lm"], folder)
-    return Program(folder / f"driver{damage}")
+    units = sorted(name for name in files if name.endswith(".c"))
+    _run([*common, *units, "-o", "driver", "-lm"], folder)
+    return Program(folder / "driver")
 
 
 def tables(code: StepCode, robot: Robot, modes: Sequence[Mode]) -> str:

@@ -1,6 +1,6 @@
-/* Runs and judges steps: driver TICKS SEED HOW, where HOW is step, batch or guide (blended modes).
+/* Runs and judges steps: driver TICKS SEED HOW BROKEN, where HOW is step, batch or guide (blended modes).
  *
- * BREAK, for the test of the judge itself: what is done to ticks before they are judged.
+ * BROKEN, for the test of the judge itself, is the kind of damage done to ticks before they are judged; 0: none.
  */
 #include HEADER
 
@@ -11,15 +11,13 @@
 
 #include <stdlib.h>
 
-#ifndef BREAK
-#define BREAK 0
-#endif
 #define BATCH 16
 
 static P(_parameters) usual, parameters;
 static P(_input) input;
 static P(_output) output;
 static long usable_ticks, stopped_ticks;
+static int broken;
 
 static void show_tick(void) {
     fprintf(stderr, "  status %d stop %d unmet %d parameter %d mode %d max_iterations %d feasible %d\n", (int)output.status, output.stop,
@@ -83,30 +81,17 @@ static void judge(const double *last, int rows) {
 
 /* Makes a tick wrong that was right; the judge must see it. */
 static void damage(const double *last) {
-    (void)last;
     const int solved = output.status == KINQP_SOLVED;
-#if BREAK == 1
-    if (solved) output.qd[NV - 1] = NAN;
-#elif BREAK == 2
-    if (solved) output.qd[0] = copysign(parameters.qd_max[0] + 1e-8 + 1e-6, output.qd[0]);
-#elif BREAK == 3
-    if (solved) input.q[0] = parameters.q_max[0], output.qd[0] = 1e-8 + 1e-6;
-#elif BREAK == 4
-    if (solved) output.qd[1] += 1e-6;
-#elif BREAK == 5
-    if (solved) parameters.dt = 0.0;
-#elif BREAK == 6
-    if (output.stop == KINQP_STOP_BRAKING && last && last[0] > 0.0) output.qd[0] = fmin(last[0], parameters.qd_max[0]) - parameters.qdd_max[0] * parameters.dt - 1e-6;
-#elif BREAK == 7
-    if (output.stop != KINQP_STOP_NONE) output.status = KINQP_SOLVED, output.stop = KINQP_STOP_NONE;
-#elif BREAK == 8
-    if (output.stop != KINQP_STOP_NONE) output.qd[0] = 1e-6;
-#elif BREAK == 9
-    if (solved) parameters.qd_max[0] = INFINITY;
-#elif BREAK == 10
-    if (solved) input.q[0] = NAN;
-#endif
-    (void)solved;
+    if (broken == 1 && solved) output.qd[NV - 1] = NAN;
+    if (broken == 2 && solved) output.qd[0] = copysign(parameters.qd_max[0] + 1e-8 + 1e-6, output.qd[0]);
+    if (broken == 3 && solved) input.q[0] = parameters.q_max[0], output.qd[0] = 1e-8 + 1e-6;
+    if (broken == 4 && solved) output.qd[1] += 1e-6;
+    if (broken == 5 && solved) parameters.dt = 0.0;
+    if (broken == 6 && output.stop == KINQP_STOP_BRAKING && last && last[0] > 0.0) output.qd[0] = fmin(last[0], parameters.qd_max[0]) - parameters.qdd_max[0] * parameters.dt - 1e-6;
+    if (broken == 7 && output.stop != KINQP_STOP_NONE) output.status = KINQP_SOLVED, output.stop = KINQP_STOP_NONE;
+    if (broken == 8 && output.stop != KINQP_STOP_NONE) output.qd[0] = 1e-6;
+    if (broken == 9 && solved) parameters.qd_max[0] = INFINITY;
+    if (broken == 10 && solved) input.q[0] = NAN;
 }
 
 static void batch_of_states(void) {
@@ -235,9 +220,10 @@ static long history(int guide) {
 }
 
 int main(int count, char **arguments) {
-    if (count != 4) return 2;
+    if (count != 5) return 2;
     const long ticks = atol(arguments[1]);
     long done = 0;
+    broken = atoi(arguments[4]);
     seed_state = (uint64_t)strtoull(arguments[2], NULL, 10);
     P(_default_parameters)(&usual);
     while (done < ticks)
