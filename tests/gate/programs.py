@@ -154,7 +154,7 @@ def tables(code: StepCode, robot: Robot, modes: Sequence[Mode]) -> str:
         _array("double", "mode_axes[MODES][9]", [np.ravel(mode.axes) for mode in modes]),
         _array("double", "mode_depth[MODES]", [mode.depth for mode in modes]),
         "typedef struct { const char *name; size_t offset; int size; double least, most; } field;",
-        "static const field transition_field = {\"transition\", 0, 1, 0.0, 1.7976931348623157e308};",
+        'static const field transition_field = {"transition", 0, 1, 0.0, 1.7976931348623157e308};',
         _fields("fields", f"{PREFIX}_parameters", code.parameters),
         "#ifdef JUDGED_GUIDING_H",
         _fields("settings", f"{PREFIX}_guiding_parameters", settings),
