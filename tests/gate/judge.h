@@ -141,7 +141,7 @@ static void judge_joint(const limits *at, int i, double qd) {
     if (!(way * (1.0L - 1e-12L) <= allowed)) found(WRONG_POSITION, (double)way, (double)distance);
 }
 
-/* Promise 4; `asked` NULL: it is not judged here. */
+/* Promise 4. */
 static void judge_rows(int mode, const double *q, const double *qd, const double *asked) {
     if (!mode_m_fixed[mode]) return;
     double rows[6][NV], turning = 0.0;
@@ -155,7 +155,7 @@ static void judge_rows(int mode, const double *q, const double *qd, const double
     }
 }
 
-/* A command that is said to be usable. */
+/* A command that is said to be usable; `asked` NULL: locked rows are not judged here. */
 static void judge_usable(const limits *at, int mode, const double *qd, const double *asked, const double *qd_prev) {
     if (mode < 0 || mode >= MODES || !all_finite(NV, at->q)) {
         found(WRONG_INPUT, mode, MODES);
