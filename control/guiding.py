@@ -317,7 +317,8 @@ class GuidingController:
             self._qd,
             zero,
             actual,
-            Status.SOLVED,
+            # A brake goes by its acceleration limits first: after a jump in positions or limits it may not keep these.
+            Status.SOLVED if done.keeps_limits(q, self._qd, self._limit) else Status.INACCURATE,
             0,
             (),
             done.mode,
