@@ -214,6 +214,7 @@ class GuidingController:
                 return self._brake(position, Status.FAILED)
             self._anchor = anchor
         if self._phase is not GuidingPhase.GUIDING and not self._v.any():
+            self._failures = 0 if sampled else self._failures
             return self._come_to_rest(position)
         stopping = self._phase is GuidingPhase.STOPPING
         asked = self._unit.ask(position, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
@@ -316,7 +317,8 @@ class GuidingController:
             self._qd,
             zero,
             actual,
-            Status.SOLVED,
+            # A brake goes by its acceleration limits first: after a jump in positions or limits it may not keep these.
+            Status.SOLVED if done.keeps_limits(q, self._qd, self._limit) else Status.INACCURATE,
             0,
             (),
             done.mode,

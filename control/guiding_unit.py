@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from ..formulations import InputError
+from ..formulations import InputError, Limits, unmet_limits
 from ..formulations.buffered import BufferedFunction
 from ..solvers import Status
 from .guiding_law import GuidingLaw
@@ -49,6 +49,7 @@ class GuidingUnit:
     def __init__(self, step: AnyStep, settings: GuidingSettings, dt: float) -> None:
         law = GuidingLaw(step.robot, step.mode, settings)
         self.mode: Final = step.mode
+        self._dt: Final = dt
         self._step: Final = step
         self._law: Final = BufferedFunction("law", law.symbols_of(law.law), law.law)
         self._observed: Final = BufferedFunction("observed", law.symbols_of(law.observed), law.observed)
@@ -162,6 +163,11 @@ class GuidingUnit:
             self._brake.given[name][:] = values
         self._brake()
         return self._brake.results["qd"][:, 0].copy()
+
+    def keeps_limits(self, q: Array, qd: Array, qd_limit: Array) -> bool:
+        """Whether a command keeps the limits of position and speed."""
+        q_min, q_max, qdd_max = (self._values[name] for name in ("q_min", "q_max", "qdd_max"))
+        return not unmet_limits(qd, Limits(q, q_min, q_max, qd_limit, qdd_max, self._dt), sampled=True)
 
     def guided_velocity(self, q: Array, qd: Array) -> Array:
         """Velocity along the guided rows, shape (m_free,) [m/s, rad/s]."""

@@ -30,6 +30,7 @@ typedef KINQP_VECTOR(double, 32) kinqp_part;
 typedef KINQP_VECTOR(long long, 32) kinqp_bits;
 #define KINQP_PARTS 1
 #define kinqp_part_fill(x) ((kinqp_part){(x), (x), (x), (x)})
+#define kinqp_bits_fill(x) ((kinqp_bits){(x), (x), (x), (x)})
 #define kinqp_part_root(x) ((kinqp_part)_mm256_sqrt_pd((__m256d)(x)))
 #define kinqp_bits_any(x) (((x)[0] | (x)[2] | (x)[1] | (x)[3]) != 0)
 #else
@@ -37,6 +38,7 @@ typedef KINQP_VECTOR(double, 16) kinqp_part;
 typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 #define KINQP_PARTS 2
 #define kinqp_part_fill(x) ((kinqp_part){(x), (x)})
+#define kinqp_bits_fill(x) ((kinqp_bits){(x), (x)})
 #define kinqp_bits_any(x) (((x)[0] | (x)[1]) != 0)
 #if defined(__SSE2__)
 #include <emmintrin.h>

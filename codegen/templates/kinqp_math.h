@@ -10,6 +10,18 @@
 KINQP_INLINE int kinqp_finite(int n, const double *x) {
     const unsigned long long exponent = 0x7ff0000000000000ULL;
     int finite = 1;
+#if defined(__GNUC__)
+    if (n >= KINQP_WIDTH) {
+        /* As many at a time as a vector holds; the last ones overlap those before, so that nothing is left over. */
+        const kinqp_bits mask = kinqp_bits_fill((long long)exponent);
+        kinqp_bits found = kinqp_bits_none;
+        for (int block = 0; block < n; block += KINQP_WIDTH) {
+            const kinqp_part part = kinqp_part_load(x + (block + KINQP_WIDTH <= n ? block : n - KINQP_WIDTH));
+            found |= ((kinqp_bits)part & mask) == mask;
+        }
+        return !kinqp_bits_any(found);
+    }
+#endif
     for (int i = 0; i < n; ++i) {
         unsigned long long bits;
         memcpy(&bits, x + i, sizeof bits);
