@@ -178,6 +178,7 @@ class CompiledGuiding:
         self._q[:] = checked_array("q", q, self.robot.nv, finite=False)
         self._wrench[:] = checked_array("wrench", wrench, 6, finite=False)
         engaged = self._state.mode
+        # The first tick engages the mode that is wanted.
         self._values.write(self._input.mode if engaged < 0 else engaged)
         code = self._tick(self._parameters, self._state, self._input, self._output)
         output = self._output

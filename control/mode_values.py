@@ -76,16 +76,16 @@ class ModeValues:
         InputError
             Naming a value without a default that was not set.
         """
-        if mode == self._written:
+        # A mode that is none of them is refused by the tick.
+        if mode == self._written or not 0 <= mode < len(self._modes):
             return
         self.put(mode)
         for name, spec in self._specs[mode].items():
             if name not in self._values[mode]:
                 raise InputError(f"{name}: expected {describe_input(spec, self._modes[mode])}, got nothing")
-        self._written = mode
 
     def put(self, mode: int) -> None:
         """Put what there is of the values of a mode into the struct."""
         for name, values in self._values[mode].items():
             self._places[name][: len(values)] = values
-        self._written = None
+        self._written = mode if self._values[mode].keys() >= self._specs[mode].keys() else None
