@@ -2,7 +2,8 @@
 
 from .compile_step import compile_step
 from .definite import CurvatureError
-from .export import ExportError, export_c
+from .examples import ExportError
+from .export import export_c
 from .results import BatchResult, TickResult
 from .step import CompiledStep
 

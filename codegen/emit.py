@@ -67,6 +67,8 @@ def number(value: float) -> str:
     text = f"{value:.17g}"
     if text in ("inf", "-inf"):
         return text.replace("inf", "INFINITY")
+    if text == "nan":
+        return "NAN"
     return text if any(mark in text for mark in ".en") else text + ".0"
 
 

@@ -6,55 +6,28 @@ import re
 import shutil
 import subprocess
 import tempfile
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from ..formulations import ABOVE, DEFAULT_DT, Evaluator, Mode, get_formulation, levels_of, lower
-from ..solvers import get_solver
+from ..formulations import Mode, get_formulation
 from ..solvers.native import CompilerError, compiler
 from .emit import number
-from .fields import prefix_of
+from .examples import ExportError
+from .fields import is_required, prefix_of
 from .model import step_code
+from .recorded import record, recorded_header
 from .render import environment, library_version, render_step
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from ..formulations import Formulation
     from ..robots import Robot
-    from ..solvers import Solver
+    from .fields import Field
     from .model import StepCode
 
-    Array = NDArray[np.float64]
-
-TICKS_PER_MODE: Final = 200
 TOLERANCE: Final = 1e-9
 _FLAGS: Final = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize")
-# The hand moves this much per tick [m/s, rad/s]; fast, so that a short record meets limits.
-_HAND_SPEED: Final = 0.4
-
-
-class ExportError(ValueError):
-    """A step can't be exported as asked; the message names what and why."""
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """Ticks and the answers to them: mode (N,), q, qd (N, nv), v (N, m_free); start (N,), 1 where the arm was at rest.
-
-    Elsewhere the last command is that of the tick before, and the last acceleration what led to it.
-    """
-
-    mode: NDArray[np.int64]
-    start: NDArray[np.int64]
-    q: Array
-    v: Array
-    qd: Array
 
 
 def export_c(
@@ -89,7 +62,8 @@ def export_c(
     Raises
     ------
     ExportError
-        When no modes are given, one is given twice, or the name is no C identifier.
+        When no modes are given, one is given twice, the name is no C identifier, or a parameter has neither a default
+        nor an example to record ticks with.
     """
     made = get_formulation(formulation)
     given = [modes] if isinstance(modes, str | Mode) else list(modes)
@@ -118,6 +92,7 @@ def export_c(
         "previous": previous,
         "change": change,
         "remembers": previous or change,
+        "required": required_fields(code),
     }
     files["main.c"] = templates.get_template("main.c.j2").render(shared | {"tolerance": number(TOLERANCE)})
     files["recorded.h"] = recorded_header(recorded, code, remembers=previous or change)
@@ -149,78 +124,10 @@ def export_c(
     return folder
 
 
-def record(robot: Robot, formulation: Formulation, modes: Sequence[Mode]) -> Recorded:
-    """Run every mode in closed loop through the interpreted path, from where every other joint is close to its limit.
-
-    Ticks whose answer the solver itself doesn't vouch for are left out; after one the arm is at rest again.
-    """
-    low = np.where(np.isfinite(robot.q_min), robot.q_min, -np.pi)
-    high = np.where(np.isfinite(robot.q_max), robot.q_max, np.pi)
-    rng = np.random.default_rng(0)
-    columns: list[tuple[int, bool, Array, Array, Array]] = []
-    for index, mode in enumerate(modes):
-        levels = [Evaluator(lower(level, robot, mode)) for level in levels_of(formulation)]
-        solver = get_solver("active-set", tolerance=1e-10)
-        q = low + (0.25 + 0.5 * rng.random(robot.nv)) * (high - low)
-        q[1::2] = high[1::2] - 1e-3  # several at once, so that the solver has something to do
-        start, qd, qdd = True, np.zeros(robot.nv), np.zeros(robot.nv)
-        amplitude = _HAND_SPEED * rng.uniform(0.5, 1.0, mode.m_free)
-        phase = rng.uniform(0.0, 2.0 * np.pi, mode.m_free)
-        for tick in range(TICKS_PER_MODE):
-            v = amplitude * np.sin(phase + 2.0 * np.pi * tick / TICKS_PER_MODE)
-            command = _command(levels, solver, {"q": q, "v": v, "qd_prev": qd, "qdd_prev": qdd})
-            if command is None:
-                start, qd, qdd = True, np.zeros(robot.nv), np.zeros(robot.nv)
-                q = q + 1e-3 * rng.normal(size=robot.nv)
-                continue
-            columns.append((index, start, q, v, command))
-            start, qd, qdd = False, command, (command - qd) / DEFAULT_DT
-            q = q + DEFAULT_DT * qd
-    if not columns:
-        raise ExportError(f"{formulation.name} on {robot.name}: expected ticks that can be solved, got none")
-    widest = max(mode.m_free for mode in modes)
-    return Recorded(
-        np.array([index for index, *_ in columns]),
-        np.array([int(start) for _, start, *_ in columns]),
-        np.array([q for _, _, q, _, _ in columns]),
-        np.array([np.pad(v, (0, widest - len(v))) for *_, v, _ in columns]),
-        np.array([qd for *_, qd in columns]),
-    )
-
-
-def _command(levels: Sequence[Evaluator], solver: Solver, given: dict[str, Array]) -> Array | None:
-    """Command at a state; none where a level is not solved."""
-    for evaluate in levels:
-        names = {each.name for each in evaluate.inputs}
-        instance = evaluate(**{name: value for name, value in given.items() if name in names})
-        solution = solver.solve(instance.qp)
-        if not solution.solved:
-            return None
-        given = given | {ABOVE: instance.K @ solution.x + instance.k}
-    return given[ABOVE]
-
-
-def recorded_header(recorded: Recorded, code: StepCode, *, remembers: bool) -> str:
-    """Write recorded ticks as a C header of constant tables; `remembers`: with where the memory of main.c starts."""
-    lines = [
-        "/* Recorded ticks and the answers to them: see main.c. */",
-        f"#ifndef {code.prefix.upper()}_RECORDED_H",
-        f"#define {code.prefix.upper()}_RECORDED_H",
-        "",
-        f"enum {{ recorded_ticks = {len(recorded.mode)} }};",
-        "",
-        f"static const int recorded_mode[recorded_ticks] = {{{', '.join(map(str, recorded.mode))}}};",
-    ]
-    if remembers:
-        lines += ["", "/* 1: the arm is at rest, and what was sent before is of no account */"]
-        lines += [f"static const int recorded_start[recorded_ticks] = {{{', '.join(map(str, recorded.start))}}};"]
-    units = {"q": "rad or m", "v": "m/s, rad/s", "qd": "rad/s or m/s"}
-    for name, unit in units.items():
-        table: Array = getattr(recorded, name)
-        lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[recorded_ticks][{table.shape[1]}] = {{"]
-        lines += [f"    {{{', '.join(number(float(x)) for x in row)}}}," for row in table]
-        lines.append("};")
-    return "\n".join([*lines, "", "#endif", ""])
+def required_fields(code: StepCode) -> list[Field]:
+    """Parameters that have no default."""
+    names = {given.name for mode in code.modes for given in mode.inputs if is_required(given)}
+    return [field for field in code.parameters if field.name in names]
 
 
 def _sizes(code: StepCode, files: dict[str, str]) -> dict[str, str]:

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import casadi as ca
+import numpy as np
 
+from ..formulations import ABOVE
 from .emit import emit, number
 from .kernels import pack, places
 
@@ -146,10 +148,17 @@ def prefix_of(robot: str, formulation: str) -> str:
     return identifier(f"kinqp_{robot[:_LONGEST_NAME]}_{formulation[:_LONGEST_NAME]}")
 
 
+def is_required(given: Input) -> bool:
+    """Whether a run-time input is a parameter that the caller must set, because it has no default."""
+    return given.default is None and given.name not in (*SIGNALS, ABOVE)
+
+
 def field_of(given: Input) -> Field:
     """Return the struct field that a run-time input is read from."""
-    default = given.default if given.default is not None else [0.0] * given.size
-    comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')} [{given.unit}]"
+    # NaN is refused, so that a parameter that was forgotten is no zero that means something.
+    default = given.default if given.default is not None else [np.nan] * given.size
+    must = ", no default: must be set" if is_required(given) else ""
+    comment = f"{_COMMENTS.get(given.name, 'run-time parameter of the formulation')}{must} [{given.unit}]"
     array = given.size > 1 or given.name in _ARRAYS
     least, most = map(number, given.range)
     defaults = tuple(number(float(x)) for x in default)

@@ -10,7 +10,7 @@ from ..codegen.fields import prefix_of
 from ..codegen.model import step_code
 from ..codegen.render import render_step
 from ..codegen.step import STEP_FLAGS
-from ..formulations import DEFAULT_DT, InputError, check_input, get_formulation
+from ..formulations import DEFAULT_DT, get_formulation
 from ..solvers import Status
 from ..solvers.active_set import STATUSES
 from ..solvers.native import build_library, declarations
@@ -19,6 +19,8 @@ from .guiding_code import render_guiding
 from .guiding_law import GuidingLaw
 from .guiding_result import GuidingPhase, GuidingResult
 from .guiding_settings import GuidingSettings
+from .mode_values import ModeValues
+from .set_inputs import index_of_mode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,9 +88,8 @@ class CompiledGuiding:
         self._input: Final = ffi.new(f"{prefix}_guiding_input *")
         self._output: Final = ffi.new(f"{prefix}_guiding_output *")
         getattr(self._library, f"{prefix}_default_guiding")(self._parameters)
-        self._names: Final = tuple(str(mode) for mode in self.modes)
         self._rows: Final = tuple(mode.rows for mode in code.modes)
-        self._specs: Final = self._settable(code)
+        self._values: Final = self._settable(code)
         self._q: Final = self._view(self._input, "q")
         self._wrench: Final = self._view(self._input, "wrench")
         self._results: Final = {name: self._view(self._output, name) for name in ("qd", "v", "v_actual", "drift")}
@@ -96,19 +97,19 @@ class CompiledGuiding:
         self._reason = ""
         self.reset()
 
-    def _settable(self, code: Any) -> dict[str, tuple[Input, Array]]:
-        """Inputs that can be set, with where they stand."""
-        law = GuidingLaw(self.robot, self.modes[0], self.settings)
-        # The structs have room for the mode with most entries, and the values of one mode are those of all.
-        by_size = sorted((given for mode in code.modes for given in mode.inputs), key=lambda given: given.size)
-        inputs = {given.name: given for given in (*by_size, *law.settable)}
+    def _settable(self, code: Any) -> ModeValues:
+        """What can be set in each mode, with where it stands in the structs."""
         of_step = {field.name for field in code.parameters} - {"dt", "qdd_prev"}
-        found = {}
-        for name, given in inputs.items():
-            owner = self._parameters.step if name in of_step else self._parameters
-            if name in of_step or any(name == each.name for each in law.settable):
-                found[name] = given, self._view(owner, name)
-        return found
+        specs: list[dict[str, Input]] = []
+        for mode, mode_code in zip(self.modes, code.modes, strict=True):
+            law = GuidingLaw(self.robot, mode, self.settings).settable
+            of_mode = (given for given in mode_code.inputs if given.name in of_step)
+            specs.append({given.name: given for given in (*law, *of_mode)})
+        places = {
+            name: self._view(self._parameters.step if name in of_step else self._parameters, name)
+            for name in dict.fromkeys(name for known in specs for name in known)
+        }
+        return ModeValues(self.modes, specs, places)
 
     def _view(self, struct: Any, name: str) -> Array:
         address = self._ffi.addressof(struct, name)
@@ -136,20 +137,18 @@ class CompiledGuiding:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what `set` takes."""
-        return tuple(self._specs)
+        return self._values.names
 
     def reset(self) -> None:
         """Begin again: at rest, with the first mode, anchored where the arm will be at the next tick."""
+        self._values.put(0)
         self._start(self._parameters, self._state)
         self._input.mode = self._input.stop = 0
         self._reason = ""
 
     def engage(self, mode: str | Mode) -> None:
         """As `GuidingController.engage`."""
-        name = str(checked_modes([mode])[0])
-        if name not in self._names:
-            raise ValueError(f"mode: expected one of {', '.join(self._names)}, got {name!r}")
-        self._input.mode = self._names.index(name)
+        self._input.mode = index_of_mode(self.modes, mode)
         if self.phase is GuidingPhase.GUIDING:
             # Also for the mode that is engaged: it is anchored anew.
             self._state.phase = _PHASES.index(GuidingPhase.STOPPING)
@@ -164,28 +163,23 @@ class CompiledGuiding:
         self._input.stop = self._state.fault = 0
         self._reason = ""
 
-    def set(self, **inputs: ArrayLike) -> None:
-        """As `GuidingController.set`, in all modes at once.
-
-        What has an entry for each guided row (`task_weight`) is given for the mode that has most of them; others take
-        the first ones.
-        """
-        values: list[tuple[Array, Array]] = []
-        for name, value in inputs.items():
-            if name not in self._specs:
-                raise InputError(f"{name}: expected an input among {', '.join(self._specs)}, got {name!r}")
-            spec, place = self._specs[name]
-            values.append((place, np.broadcast_to(check_input(spec, value, self.mode), place.shape)))
-        low, high = (np.broadcast_to(inputs.get(n, self._specs[n][1]), (self.robot.nv,)) for n in ("q_min", "q_max"))
-        if (low > high).any():
-            raise InputError(f"q_min and q_max: expected q_min <= q_max at every joint, got {low} and {high}")
-        for place, new in values:
-            place[:] = new
+    def set(self, mode: str | Mode | None = None, /, **inputs: ArrayLike) -> None:
+        """As `GuidingController.set`: in one mode, or in all that have an input."""
+        self._values.set(mode, inputs)
 
     def __call__(self, q: ArrayLike, wrench: ArrayLike) -> GuidingResult:
-        """As `GuidingController.__call__`."""
+        """As `GuidingController.__call__`.
+
+        Raises
+        ------
+        InputError
+            Also naming an input without a default that was not set in the mode that is engaged.
+        """
         self._q[:] = checked_array("q", q, self.robot.nv, finite=False)
         self._wrench[:] = checked_array("wrench", wrench, 6, finite=False)
+        engaged = self._state.mode
+        # The first tick engages the mode that is wanted.
+        self._values.write(self._input.mode if engaged < 0 else engaged)
         code = self._tick(self._parameters, self._state, self._input, self._output)
         output = self._output
         mode = self.modes[max(output.mode, 0)]

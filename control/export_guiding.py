@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from ..codegen.emit import number
-from ..codegen.export import TOLERANCE, export_c
+from ..codegen.examples import ExportError, example_inputs, example_lines, stack_examples
+from ..codegen.export import TOLERANCE, export_c, required_fields
 from ..codegen.fields import prefix_of
 from ..codegen.model import step_code
 from ..codegen.render import environment
-from ..formulations import Mode, get_formulation
+from ..formulations import Mode, get_formulation, levels_of, lower
+from ..solvers import Status
 from .checks import checked_modes
 from .guiding_code import render_guiding
 from .guiding_settings import GuidingSettings
@@ -74,21 +76,23 @@ def export_guiding(
     chosen = settings or GuidingSettings()
     parsed = checked_modes([modes] if isinstance(modes, str | Mode) else modes)
     made = get_formulation(formulation)
+    # First, so that what can't be recorded leaves no folder behind.
+    table, examples = record(robot, made, parsed, chosen)
     folder = export_c(robot, made, list(parsed), out, name=name)
     prefix = prefix_of(robot.name, made.name) if name is None else name
     code = step_code(robot, made, parsed, prefix)
     files = render_guiding(code, robot, parsed, chosen)
-    table = record(robot, made, parsed, chosen)
     shared = {
         "p": prefix,
         "nv": robot.nv,
         "tolerance": number(TOLERANCE),
         "ticks": len(table["mode"]),
+        "required": required_fields(code),
         "change": any(field.name == "qdd_prev" for field in code.parameters),
     }
     templates = environment()
     files["guiding_main.c"] = templates.get_template("guiding_main.c.j2").render(shared)
-    files["guiding_recorded.h"] = _header(table, prefix)
+    files["guiding_recorded.h"] = _header(table, examples, prefix)
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
     for file, template in (("CMakeLists.txt", "guiding_cmake.j2"), ("README.md", "guiding_readme.md.j2")):
@@ -99,13 +103,20 @@ def export_guiding(
 
 def record(
     robot: Robot, formulation: Formulation, modes: Sequence[Mode], settings: GuidingSettings
-) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
+) -> tuple[dict[str, NDArray[np.float64] | NDArray[np.int64]], dict[str, Array]]:
     """Run a session through the interpreted controller: every mode in turn, one stop, joints close to their limits.
 
     Returns
     -------
-    dict of str to ndarray
+    table : dict of str to ndarray
         `mode` and `stop`, (N,); `q`, `qd`, (N, nv), `wrench`, (N, 6).
+    examples : dict of str to ndarray
+        Values of the parameters without a default, each (modes, size).
+
+    Raises
+    ------
+    ExportError
+        Naming a parameter without a default that has no example either, or a mode in which a tick is not solved.
     """
     controller = make_guiding(robot, formulation, modes, settings=settings, tolerance=1e-10)
     low = np.where(np.isfinite(robot.q_min), robot.q_min, -np.pi)
@@ -113,6 +124,11 @@ def record(
     rng = np.random.default_rng(0)
     q = low + (0.25 + 0.5 * rng.random(robot.nv)) * (high - low)
     q[1::2] = high[1::2] - 1e-3  # several at once, so that the solver has something to do
+    examples = []
+    for mode in modes:
+        inputs = [each for level in levels_of(formulation) for each in lower(level, robot, mode).inputs]
+        examples.append(example_inputs(inputs, q))
+        controller.set(mode, **examples[-1])
     phase = rng.uniform(0.0, 2.0 * np.pi, 6)
     rows: list[tuple[int, int, Array, Array, Array]] = []
     for tick in range(TICKS_PER_MODE * len(modes)):
@@ -125,16 +141,22 @@ def record(
         if index == 0 and within == sum(_STOP):
             controller.resume()
         wrench = _PULL * np.sin(phase + 2.0 * np.pi * within / TICKS_PER_MODE)
-        qd = controller(q, wrench).qd
-        rows.append((index, int(stop), q, wrench, qd))
-        q = q + controller.dt * qd
+        result = controller(q, wrench)
+        if result.status is not Status.SOLVED:
+            raise ExportError(
+                f"{formulation.name} on {robot.name}: expected a session to record in which every tick is solved, got "
+                f"{result.status.value} in mode {result.mode} at tick {within}; leave the mode out, or the "
+                "constraint that locks the same rows"
+            )
+        rows.append((index, int(stop), q, wrench, result.qd))
+        q = q + controller.dt * result.qd
     columns = zip(*rows, strict=True)
-    return {
-        label: np.array(column) for label, column in zip(("mode", "stop", "q", "wrench", "qd"), columns, strict=True)
-    }
+    labels = ("mode", "stop", "q", "wrench", "qd")
+    table = {label: np.array(column) for label, column in zip(labels, columns, strict=True)}
+    return table, stack_examples(examples)
 
 
-def _header(table: dict[str, NDArray[np.float64] | NDArray[np.int64]], prefix: str) -> str:
+def _header(table: dict[str, NDArray[np.float64] | NDArray[np.int64]], examples: dict[str, Array], prefix: str) -> str:
     guard = f"{prefix.upper()}_GUIDING_RECORDED_H"
     lines = [
         "/* A recorded session: see guiding_main.c. */",
@@ -151,4 +173,5 @@ def _header(table: dict[str, NDArray[np.float64] | NDArray[np.int64]], prefix: s
         lines += ["", f"/* [{unit}] */", f"static const double recorded_{name}[recorded_ticks][{rows.shape[1]}] = {{"]
         lines += [f"    {{{', '.join(number(float(x)) for x in row)}}}," for row in rows]
         lines.append("};")
+    lines += example_lines(examples)
     return "\n".join([*lines, "", "#endif", ""])

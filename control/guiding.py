@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from ..formulations import DEFAULT_DT, InputError, Mode, check_input
+from ..formulations import DEFAULT_DT, Mode
 from ..solvers import Status
 from .checks import checked_array, checked_modes, checked_period
 from .guiding_result import GuidingPhase, GuidingResult
 from .guiding_settings import GuidingSettings
 from .guiding_unit import GuidingUnit
+from .set_inputs import checked_values, index_of_mode
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -117,15 +118,9 @@ class GuidingController:
         ValueError
             When it is none of `modes`.
         """
-        self._wanted = self._units[self._named(mode)]
+        self._wanted = self._units[str(self.modes[index_of_mode(self.modes, mode)])]
         if self._phase is GuidingPhase.GUIDING:
             self._phase = GuidingPhase.STOPPING
-
-    def _named(self, mode: str | Mode) -> str:
-        name = str(checked_modes([mode])[0])
-        if name not in self._units:
-            raise ValueError(f"mode: expected one of {', '.join(self._units)}, got {name!r}")
-        return name
 
     def stop(self, reason: str = "asked to") -> None:
         """Bring the arm to rest, and stay there until `resume`."""
@@ -161,27 +156,14 @@ class GuidingController:
         ValueError
             When the mode is none of `modes`.
         """
-        if mode is not None and "qd_max" in inputs:
-            raise InputError(f"qd_max: expected for all modes at once, got mode {mode}")
-        units = list(self._units.values()) if mode is None else [self._units[self._named(mode)]]
-        known = [{spec.name: spec for spec in unit.settable} for unit in units]
-        for name in inputs:
-            if not any(name in specs for specs in known):
-                names = ", ".join(dict.fromkeys(known_name for specs in known for known_name in specs))
-                raise InputError(f"{name}: expected an input among {names}, got {name!r}")
-        checked: list[dict[str, Array]] = []
-        for unit, specs in zip(units, known, strict=True):
-            given = {name: (specs[name], value) for name, value in inputs.items() if name in specs}
-            checked.append(
-                {
-                    name: np.broadcast_to(check_input(spec, value, unit.mode), (spec.size,)).copy()
-                    for name, (spec, value) in given.items()
-                }
-            )
-            unit.check(checked[-1])
-        for unit, values in zip(units, checked, strict=True):
+        units = list(self._units.values())
+        specs = [{spec.name: spec for spec in unit.settable} for unit in units]
+        checked = checked_values(self.modes, specs, mode, inputs)
+        for index, values in checked.items():
+            units[index].check(values)
+        for index, values in checked.items():
             for name, value in values.items():
-                unit.set(name, value)
+                units[index].set(name, value)
                 if name == "qd_max":
                     self._target = value
 

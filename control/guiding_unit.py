@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from ..formulations import InputError, Limits, unmet_limits
+from ..formulations import Limits, unmet_limits
 from ..formulations.buffered import BufferedFunction
 from ..solvers import Status
 from .guiding_law import GuidingLaw
+from .set_inputs import check_order
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,11 +82,7 @@ class GuidingUnit:
         InputError
             When a lower position limit lies above the upper one.
         """
-        limits = [inputs.get(name, self._values[name]) for name in ("q_min", "q_max")]
-        if (limits[0] > limits[1]).any():
-            raise InputError(
-                f"q_min and q_max: expected q_min <= q_max at every joint, got {limits[0]} and {limits[1]}"
-            )
+        check_order(inputs, self._values)
 
     def set(self, name: str, values: Array) -> None:
         """Change an input of the law, the step or both; one that this mode does not have is left out."""

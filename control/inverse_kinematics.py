@@ -2,10 +2,11 @@
 Inverse kinematics within joint limits, by steps of the same QPs that move the arm.
 
 One step is a QP of `joint-space` over a period of one second: the hand asks for the whole remaining error as a
-velocity, the joints may move as far as their limits and the trust region let them, and the trust region follows how
-well the linearised kinematics predicted the error. With the QP's box this is the Gauss-Newton method with box-shaped
-trust regions (Nocedal and Wright, "Numerical Optimization", 2006, section 10.3): quadratic near a solution, and where
-none exists it ends in a point that no small motion within the limits improves.
+velocity, the joints may move as far as their position limits and the trust region let them, and the trust region
+follows how well the linearised kinematics predicted the error. How fast a joint may be is no part of the question.
+With the QP's box this is the Gauss-Newton method with box-shaped trust regions (Nocedal and Wright, "Numerical
+Optimization", 2006, section 10.3): quadratic near a solution, and where none exists it ends in a
+point that no small motion within the limits improves.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..formulations import JointSpace, Mode, ModeError
 from ..robots import finite_vector, real_array
 from ..solvers import Status
 from .ik_result import IkResult, IkStatus
+from .joint_ranges import largest_steps, spread_starts
 from .step import make_step
 
 if TYPE_CHECKING:
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# One second, so that a velocity is a step.
+# One second, so that a velocity is a step; its limit is then the trust region's, whatever the robot's is.
 _PERIOD: Final = 1.0
 # The bound of `viable` is then the distance to the limit: no braking distance within one period.
 _ACCELERATION: Final = 1e9
@@ -111,9 +113,8 @@ class InverseKinematics:
         self._step: Final = make_step(
             robot, JointSpace(), Mode.free() if self._full else Mode.position(), solver=solver
         )
-        # A joint's whole speed is a step of about 1 rad or 0.1 m; joints without limits turn by pi at most.
-        self._reach: Final = np.minimum(robot.qd_max, np.pi)
-        self._starts: Final = self._spread(starts - 1, seed)
+        self._reach: Final = largest_steps(robot)
+        self._starts: Final = spread_starts(robot, starts - 1, seed)
 
     def __call__(
         self, target: ArrayLike, q0: ArrayLike, *, only: bool = False, max_steps: int | None = None
@@ -235,16 +236,6 @@ class InverseKinematics:
         goal[:3, 3] += moved[:3]
         goal[:3, :3] = pin.exp3(moved[3:]) @ start[:3, :3]
         return goal
-
-    def _spread(self, count: int, seed: int) -> Array:
-        """Starts spread evenly over the joint ranges (a full turn for joints without limits), shape (count, nv)."""
-        from scipy.stats import qmc  # here, because it takes half a second to import
-
-        low = np.where(np.isfinite(self.robot.q_min), self.robot.q_min, -np.pi)
-        high = np.where(np.isfinite(self.robot.q_max), self.robot.q_max, np.pi)
-        drawn: Array = qmc.Halton(self.robot.nv, rng=np.random.default_rng(seed)).random(count)
-        spread: Array = low + drawn * (high - low)
-        return spread
 
 
 def _best(descents: list[_Descent]) -> _Descent:

@@ -49,6 +49,8 @@ class Input:
         Whether an infinite value is accepted ("no limit").
     highest : float
         Largest value that makes sense; a larger one is refused.
+    example : ca.SX, shape (size, 1), or None
+        A value that makes sense at a state, for inputs without a default; see `TickInputs.parameter`.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Input:
     positive: bool = False
     may_be_infinite: bool = False
     highest: float = np.inf
+    example: ca.SX | None = None
 
     @cached_property
     def size(self) -> int:
@@ -133,6 +136,7 @@ class TickInputs:
         may_be_infinite: bool = False,
         highest: float = np.inf,
         unit: str = "-",
+        example: ca.SX | None = None,
     ) -> ca.SX:
         """Return the symbol of a run-time input; the same name gives the same symbol.
 
@@ -154,6 +158,9 @@ class TickInputs:
             Largest value that makes sense.
         unit : str
             For messages and generated comments.
+        example : ca.SX, shape (size, 1), optional
+            Where there is no default: a value that makes sense at a state, computed from `q` and from inputs that have
+            a default. Nothing but checks runs with it, such as the recorded ticks of an export.
 
         Returns
         -------
@@ -170,7 +177,7 @@ class TickInputs:
                 raise ValueError(f"parameter {name}: expected its first size, {known.size}, got {size}")
             return known.symbol
         value = None if default is None else np.broadcast_to(np.asarray(default, dtype=float), (size,)).copy()
-        made = Input(name, ca.SX.sym(name, size), value, lowest, unit, positive, may_be_infinite, highest)
+        made = Input(name, ca.SX.sym(name, size), value, lowest, unit, positive, may_be_infinite, highest, example)
         if value is not None and not made.admits(value):
             raise ValueError(f"parameter {name}: expected as default {made.describe_range()}, got {default}")
         self._inputs[name] = made

@@ -77,8 +77,12 @@ class Constraint(ABC):
         positive: bool = False,
         not_negative: bool = False,
         may_be_infinite: bool = False,
+        example: ca.SX | None = None,
     ) -> ca.SX:
-        """Return the symbol of a run-time parameter named after the constraint, shape (size, 1)."""
+        """Return the symbol of a run-time parameter named after the constraint, shape (size, 1).
+
+        Without a default, give an `example`, as `Tick.parameter` takes it: an export records its ticks with it.
+        """
         prefix = re.sub(r"\W+", "_", self.name).lower()
         return tick.parameter(
             f"{prefix}_{suffix}",
@@ -88,6 +92,7 @@ class Constraint(ABC):
             positive=positive,
             may_be_infinite=may_be_infinite,
             unit=unit,
+            example=example,
         )
 
     def command_of(self, qp: QuadraticProgram) -> ca.SX:

@@ -82,7 +82,8 @@ class ElbowHold(Constraint):
         if not self.correct:
             qp.equal(rate, 0.0, name=self.name)
             return
-        away = _difference(angle, self.parameter(tick, "angle", self.angle, unit="rad"))
+        here = ca.atan2(angle.sine, angle.cosine)
+        away = _difference(angle, self.parameter(tick, "angle", self.angle, unit="rad", example=here))
         gain = self.parameter(tick, "gain", 5.0, unit="1/s", not_negative=True)
         speed = self.parameter(tick, "speed", 0.2, unit="rad/s", not_negative=True)
         back = -limited(ca.fmin(gain, 1 / tick.dt) * away, speed) * angle.scale

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import casadi as ca
 
@@ -13,6 +13,9 @@ from .base import Constraint, limited
 if TYPE_CHECKING:
     from ..program import QuadraticProgram
     from ..tick import Tick
+
+# Of the pivot of recorded ticks behind the tip [m].
+_EXAMPLE_DEPTH: Final = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +68,9 @@ class RemoteCentre(Constraint):
 
     def add(self, qp: QuadraticProgram, tick: Tick) -> None:
         """Add the two equalities."""
-        pivot = self.parameter(
-            tick, "pivot", None if self.pivot is None else [*map(float, self.pivot)], size=3, unit="m"
-        )
+        default = None if self.pivot is None else [*map(float, self.pivot)]
+        on_shaft = tick.pose[:3, 3] - _EXAMPLE_DEPTH * tick.pose[:3, 2]
+        pivot = self.parameter(tick, "pivot", default, size=3, unit="m", example=on_shaft)
         gain = self.parameter(tick, "gain", 10.0, unit="1/s", not_negative=True)
         speed = self.parameter(tick, "speed", 0.02, unit="m/s", not_negative=True)
         rows, error = shaft(tick, pivot)

@@ -116,13 +116,6 @@ class TestFaults:
             controller.set(force_dead_zone=0.0, **inputs)
         assert not controller(START, [0.9, 0, 0, 0, 0, 0]).v.any()
 
-    def test_weights_of_rows_are_those_of_the_widest_mode(self):
-        controller = CompiledGuiding(ROBOT, "joint-space", MODES)  # the narrower one last
-        controller.set(task_weight=[1.0, 2.0, 3.0])
-        assert controller(START, [0, 20.0, 0, 0, 0, 0]).status is Status.SOLVED
-        with pytest.raises(InputError, match="task_weight"):
-            controller.set(task_weight=[1.0])
-
     def test_names(self):
         with pytest.raises(PluginError, match="solver: expected active-set without options in C, got 'clarabel'"):
             make_guiding(ROBOT, "joint-space", MODES, "clarabel", compiled=True)

@@ -1,5 +1,7 @@
 """Inverse kinematics within limits: the report's example, other arms, points out of reach, bad input."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -65,6 +67,54 @@ def test_full_poses_of_other_arms(name) -> None:
         assert within(robot, result.q)
         assert np.linalg.norm(there[:3, 3] - goal[:3, 3]) <= 1e-10
         assert angle_between(there[:3, :3], goal[:3, :3]) <= 2e-9
+
+
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [(name, "free") for name in ("lbr_med14", "ur5e", "panda")]
+    + [("davinci5", "position"), ("mixed_to_tool", "position")],
+)
+def test_how_fast_the_joints_may_be_does_not_matter(name, mode) -> None:
+    """The same steps to the same posture, bit for bit, with a thousandth of the speed and with ten times of it."""
+    robot, rng = arm(name), np.random.default_rng(6)
+    solvers = [
+        InverseKinematics(dataclasses.replace(robot, qd_max=share * robot.qd_max), mode, starts=3)
+        for share in (1.0, 1e-3, 10.0)
+    ]
+    for _ in range(3):
+        start, goal = robot.random_configuration(rng), robot.pose(robot.random_configuration(rng))
+        target = goal if mode == "free" else goal[:3, 3]
+        first, *others = (solver(target, start) for solver in solvers)
+        for other in others:
+            np.testing.assert_array_equal(other.history, first.history)
+            assert (other.status, other.starts) == (first.status, first.starts)
+
+
+SLIDE = """<robot name="slide">{links}
+<joint name="x" type="prismatic"><parent link="l0"/><child link="l1"/><axis xyz="1 0 0"/>
+  <limit lower="0" upper="{length}" velocity="{speed}" effort="1"/></joint>
+<joint name="a" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0 0 .3"/><axis xyz="0 0 1"/>
+  <limit lower="-2.9" upper="2.9" velocity="2" effort="1"/></joint>
+<joint name="b" type="revolute"><parent link="l2"/><child link="l3"/><origin xyz="0 0 .1"/><axis xyz="0 1 0"/>
+  <limit lower="-2.9" upper="2.9" velocity="2" effort="1"/></joint>
+<joint name="c" type="revolute"><parent link="l3"/><child link="l4"/><origin xyz="0 0 .4"/><axis xyz="0 1 0"/>
+  <limit lower="-2.9" upper="2.9" velocity="2" effort="1"/></joint>
+<joint name="t" type="fixed"><parent link="l4"/><child link="l5"/><origin xyz="0 0 .4"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("length", [2.0, 50.0, 1e6])
+@pytest.mark.parametrize("speed", [1.0, 0.1, 0.001])
+def test_a_slow_rail_is_used_from_the_first_start(length, speed, tmp_path) -> None:
+    """Three quarters of the rail, at most 75 m: the rail alone could go there, the other joints as they are."""
+    path = tmp_path / "slide.urdf"
+    links = "".join(f'<link name="l{i}"/>' for i in range(6))
+    path.write_text(SLIDE.format(links=links, length=length, speed=speed))
+    robot, start = load_robot(path), [0.1, 0.3, 0.8, 1.0]
+    target = robot.pose(start)[:3, 3] + [min(0.75 * length, 75.0), 0.0, 0.0]
+    result = InverseKinematics(robot, "position")(target, start, only=True)
+    assert result.status is IkStatus.REACHED
+    assert within(robot, result.q)
+    assert result.steps <= 20
 
 
 def test_a_singular_start_on_limits_gets_away() -> None:
