@@ -47,6 +47,7 @@ def example_inputs(inputs: Iterable[Input], q: Array) -> dict[str, Array]:
     given = list(inputs)
     known = [(each.symbol, q if each.name == "q" else each.default) for each in given]
     known = [(symbol, value) for symbol, value in known if value is not None]
+    values = [ca.DM(np.asarray(value)) for _, value in known]
     found: dict[str, Array] = {}
     for each in filter(is_required, given):
         if each.example is None:
@@ -55,7 +56,7 @@ def example_inputs(inputs: Iterable[Input], q: Array) -> dict[str, Array]:
                 f"is declared, parameter({each.name!r}, ..., example=...), or as an option if there is one"
             )
         function = ca.Function("example", [symbol for symbol, _ in known], [each.example])
-        value = np.asarray(function.call([ca.DM(value) for _, value in known])[0], dtype=np.float64).ravel()
+        value = np.asarray(function.call(values)[0], dtype=np.float64).ravel()
         if value.shape != (each.size,) or not each.admits(value):
             raise ExportError(f"{each.name}: expected as example {each.size} {each.describe_range()}, got {value}")
         found[each.name] = value

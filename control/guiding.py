@@ -241,7 +241,9 @@ class GuidingController:
         usable = bool(np.isfinite(measured).all() and np.isfinite(pull).all())
         last = self._position
         if usable:
-            position = self._unit.observe(measured, measured if last is None else last, self._qd)
+            # After more ticks than are held nothing is expected of the next sample.
+            expected = measured if last is None or self._held > self.settings.hold_ticks else last
+            position = self._unit.observe(measured, expected, self._qd)
             usable = bool(np.isfinite(position).all())
         if usable:
             self._held, self._wrench = 0, pull

@@ -77,7 +77,7 @@ def compiled(
 
 def everything() -> CompiledStep:
     """Return the step of `Everything` on the UR5e."""
-    return compiled("ur5e", Everything.name, "fix-orientation", quick=True)
+    return compiled("ur5e", Everything.name, "position", quick=True)
 
 
 @functools.cache
@@ -134,4 +134,5 @@ class Everything(Formulation):
         qp.between(-0.01, slack, 0.02, name="slack")
         qp.between(-0.3, qd[0] - qd[1], 0.3, name="difference")
         qp.between(tick.qd_lo, qd, tick.qd_hi, name="joint limits")
+        qp.between(tick.qd_lo, qd + 0.25 * double, tick.qd_hi, name="command limits")
         qp.command(qd + 0.25 * double)

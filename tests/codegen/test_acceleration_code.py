@@ -114,9 +114,8 @@ def test_both_brake_alike_where_a_tick_is_not_solved() -> None:
             assert result.status is Status.MAX_ITERATIONS, kind
             np.testing.assert_allclose(result.qd, instance.stop, rtol=1e-14, atol=1e-15)
             np.testing.assert_allclose(result.eps, instance.J_free @ instance.stop - v, rtol=0, atol=1e-12)
-            low, high = bounds_at(step.robot, q)
-            assert (result.qd >= low - 1e-12).all()
-            assert (result.qd <= high + 1e-12).all()
+            last = np.clip(qd, -step.robot.qd_max, step.robot.qd_max)
+            assert (np.abs(result.qd - last) <= step.robot.qdd_max * 1e-3 * (1.0 + 1e-9)).all()
             stopped += bool(result.qd.any())
         assert stopped > 5
 
@@ -168,8 +167,8 @@ def test_what_is_not_finite_stops_its_own_tick_only() -> None:
     Q[1, 2], P[2, 3], V[3, 0] = np.nan, np.inf, np.nan
     result = step.batch(Q, V, qd_prev=P)
     assert [status is Status.FAILED for status in result.status] == [False, True, True, True]
-    assert not result.qd[[1, 2]].any()  # where it is, or how fast it goes, isn't known
-    np.testing.assert_allclose(result.qd[3], 0.19, atol=1e-15)  # the hand's velocity isn't needed to brake
+    assert not result.qd[2].any()  # how fast it goes isn't known
+    np.testing.assert_allclose(result.qd[[1, 3]], 0.19, atol=1e-15)  # where it is, and the hand, isn't needed to brake
 
 
 @pytest.mark.parametrize(

@@ -83,7 +83,7 @@ def test_solvers_without_c_are_refused() -> None:
 
 def test_a_formulation_of_ones_own() -> None:
     """A gradient, rows besides the box, inputs without defaults, a command with an offset, no feasible point."""
-    step, reference = everything(), make_step(arm("ur5e"), Everything(), "fix-orientation", REFERENCE_SOLVER)
+    step, reference = everything(), make_step(arm("ur5e"), Everything(), "position", REFERENCE_SOLVER)
     rng = np.random.default_rng(6)
     seen: set[str] = set()
     for kind, q, v in ticks("ur5e", "fix-orientation", 48):
@@ -95,7 +95,7 @@ def test_a_formulation_of_ones_own() -> None:
         if wanted.status is Status.SOLVED:
             np.testing.assert_allclose(result.qd, wanted.qd, rtol=0, atol=1e-8)
         seen |= {name.partition("[")[0] for name in result.active}
-    assert seen == {"slack", "difference", "joint limits"}
+    assert seen == {"slack", "difference", "joint limits", "command limits"}
 
 
 def snake(joints: int) -> str:

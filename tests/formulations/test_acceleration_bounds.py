@@ -158,10 +158,15 @@ def test_bounds_by_hand(q: float, qd: float, lower: float, upper: float) -> None
     assert qdd_hi[0] == pytest.approx(upper, abs=1e-7)
 
 
+# No joint of these tests has a velocity limit below this [rad/s].
+FASTEST = 20.0
+
+
 @functools.cache
 def _braking(nv: int) -> ca.Function:
     symbols = [ca.SX.sym(letter, nv) for letter in ("qd_prev", "qd_lo", "qd_hi", "qdd_max")]
-    return ca.Function("braking", symbols, [braking(*symbols, ca.SX(DT))])
+    last, low, high, a = symbols
+    return ca.Function("braking", symbols, [braking(last, low, high, ca.SX.ones(nv) * FASTEST, a, ca.SX(DT))])
 
 
 def brake(qd: Array, low: Array | float, high: Array | float, a: Array | float = A) -> Array:
@@ -180,6 +185,13 @@ def test_braking_by_hand() -> None:
     # A joint on its braking curve brakes as it must, the others as before.
     high = np.array([5.0, 5.0, 0.19])
     np.testing.assert_allclose(brake(np.array([1.0, -0.5, 0.2]), -5.0, high), [0.99, -0.495, 0.19], atol=1e-15)
+
+
+def test_a_brake_goes_by_its_acceleration_limits_first() -> None:
+    # At 1 rad/s where 0.5 is the most: braked to it at 10 rad/s^2, and no faster. Beyond all limits: from the limit.
+    np.testing.assert_allclose(brake(np.array([1.0]), -0.5, 0.5), [0.99], atol=1e-15)
+    np.testing.assert_allclose(brake(np.array([1e9, -1e300]), -30.0, 30.0), [19.99, -19.99], atol=1e-12)
+    np.testing.assert_array_equal(brake(np.array([1.0, -2.0]), -5.0, 5.0, np.full(2, np.inf)), np.zeros(2))
 
 
 def test_braking_stops_every_joint_at_once_and_as_soon_as_possible() -> None:
@@ -210,7 +222,7 @@ def test_braking_from_an_admissible_state_is_admissible() -> None:
         low, high, _, _ = bounds_of(joints | {"qd_prev": qd})
         columns = [ca.DM(x.reshape(count, 7).T) for x in (qd, low, high, a)]
         after = np.array(function(*columns)).T.reshape(-1)
-        assert (after <= high).all()
-        assert (after >= low).all()
+        assert (after <= high + 1e-12).all()
+        assert (after >= low - 1e-12).all()
         assert (np.abs(after - qd) <= a * DT * (1.0 + 1e-9) + 1e-12).all()
         qd = after

@@ -24,14 +24,14 @@ def test_parameters() -> None:
     assert (given.name, given.size, given.unit, given.default.tolist()) == ("gain", 3, "1/s", [2.0, 2.0, 2.0])
     with pytest.raises(ValueError, match="parameter gain: expected its first size, 3, got 1"):
         tick.parameter("gain", 2.0)
-    with pytest.raises(ValueError, match="parameter low: expected a finite default not below 0, got -1"):
+    with pytest.raises(ValueError, match="parameter low: expected as default numbers not below 0 -, got -1"):
         tick.parameter("low", -1.0, lowest=0.0)
-    with pytest.raises(ValueError, match="parameter zero: expected a finite default above 0, got 0"):
+    with pytest.raises(ValueError, match="parameter zero: expected as default numbers above 0 -, got 0"):
         tick.parameter("zero", 0.0, lowest=0.0, positive=True)
     for bad in (np.nan, np.inf):
-        with pytest.raises(ValueError, match="parameter odd: expected a finite default"):
+        with pytest.raises(ValueError, match="parameter odd: expected as default finite numbers"):
             tick.parameter("odd", bad)
-    with pytest.raises(ValueError, match="parameter odd: expected a default not below"):
+    with pytest.raises(ValueError, match="parameter odd: expected as default numbers"):
         tick.parameter("odd", np.nan, may_be_infinite=True)
 
 
