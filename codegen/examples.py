@@ -45,8 +45,8 @@ def example_inputs(inputs: Iterable[Input], q: Array) -> dict[str, Array]:
         Naming a parameter that has no example either, or an example that its own range excludes.
     """
     given = list(inputs)
-    known = [(each.symbol, q if each.name == "q" else each.default) for each in given]
-    known = [(symbol, value) for symbol, value in known if value is not None]
+    named = ((each.symbol, q if each.name == "q" else each.default) for each in given)
+    known = [(symbol, value) for symbol, value in named if value is not None]
     found: dict[str, Array] = {}
     for each in filter(is_required, given):
         if each.example is None:
