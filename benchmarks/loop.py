@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import polars as pl
 
+from ..control.last_command import LastCommand
+from ..solvers import Status
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
@@ -65,19 +68,17 @@ def each_tick(
             yield state, act(state)
         return
     robot, dt = scenario.robot, scenario.dt
-    q, qd, tick = np.array(scenario.q0, dtype=float), np.zeros(robot.nv), 0
-    qdd = np.zeros(robot.nv)
+    q, last, tick = np.array(scenario.q0, dtype=float), LastCommand(robot.nv, dt), 0
     for index, phase in enumerate(scenario.phases):
         free = list(phase.mode.free_rows)
         for k in range(round(phase.duration / dt)):
             pose = robot.pose(q)
             v = (phase.mode.twist_map_at(pose) @ phase.guide.twist(k * dt, pose))[free]
-            state = State(tick, index, phase.mode, q, qd, v, qdd)
+            state = State(tick, index, phase.mode, q, last.qd, v, last.qdd)
             result = act(state)
             yield state, result
-            qdd = (result.qd - qd) / dt
-            qd = result.qd
-            q = q + dt * qd
+            last.sent(result.qd, stop=result.status is not Status.SOLVED)
+            q = q + dt * result.qd
             tick += 1
 
 

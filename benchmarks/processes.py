@@ -25,7 +25,7 @@ _PREPARE_TIMEOUT: Final = 600.0
 # A process that dies is not always the cell's fault: the machine may have wanted its memory. Once more, then it is.
 ATTEMPTS: Final = 2
 # A single-threaded process is what is measured, and what two of them beside each other don't fight over.
-ONE_THREAD: Final = dict.fromkeys(("OMP_NUMONE_THREAD", "OPENBLAS_NUMONE_THREAD", "MKL_NUMONE_THREAD"), "1")
+ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class WorkerDiedError(RuntimeError):

@@ -14,6 +14,7 @@ from rich.progress import track
 
 from ..codegen import compile_step
 from ..control import PositionObserver
+from ..control.last_command import LastCommand, is_stop
 from ..formulations import DEFAULT_DT
 from ..robots import load_robot
 from ..solvers import Status
@@ -118,22 +119,21 @@ def singular_run(
     given: dict[str, Array] = {"q_max": robot.q_max.copy()}
     for joint, angle in path.q_max_deg.items():
         given["q_max"][joint] = np.deg2rad(angle)
-    memory = {name: np.zeros(robot.nv) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
+    last = LastCommand(robot.nv, dt)
     observe = PositionObserver(robot.nv, disturbance.observer_gain, dt)
-    q, qd, moved = path.q0, np.zeros(robot.nv), np.zeros(robot.nv)
+    q, moved = path.q0, np.zeros(robot.nv)
     follow = 1.0 - np.exp(-dt / disturbance.lag) if disturbance.lag > 0.0 else 1.0
     commands, errors, wishes = [], [], []
     sigma, fixed_error, true_error, failed, unforced = np.inf, 0.0, 0.0, 0, 0.0
     for tick in range(round(path.duration(disturbance.speed) / dt)):
-        seen = observe(q + disturbance.noise * rng.normal(size=robot.nv), qd)
+        seen = observe(q + disturbance.noise * rng.normal(size=robot.nv), last.qd)
         v = path.twist(tick * dt, disturbance.speed)[free]
-        result = step(seen, v, **given, **memory)
+        result = step(seen, v, **given, **last.inputs(step))
         failed += result.status is not Status.SOLVED
         rows = _rows(robot, mode, seen)[fixed]
         limits = robot.q_min, given["q_max"], robot.qd_max, robot.qdd_max
-        unforced = max(unforced, unforced_excess(rows, seen, (qd, result.qd), limits, dt))
-        now = {"qd_prev": result.qd, "qdd_prev": (result.qd - qd) / dt}
-        memory = {name: now[name] for name in memory}
+        unforced = max(unforced, unforced_excess(rows, seen, (last.qd, result.qd), limits, dt))
+        last.sent(result.qd, stop=is_stop(step, result.status))
         qd = result.qd
         fixed_error = max(fixed_error, float(np.max(np.abs(rows @ qd), initial=0.0)))
         if tick % every == 0:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from .metrics.motion import ON_LIMIT
+from .metrics import Motion, Ticks
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,13 +64,14 @@ class CellSummary:
     bound_violation : float
         Largest excess over a joint velocity bound [rad/s or m/s].
     peak_acceleration : float
-        Largest joint acceleration, as a share of the joint's limit, over all joints.
+        Largest joint acceleration, as a share of the joint's limit in this run, over all joints; NaN without a closed
+        loop.
     watched_acceleration : float
         The same of the joints that the scenario is about; NaN where there is none, or no closed loop.
     failed : float
         Share of ticks that ended in the safe stop.
     on_limit : float
-        Share of ticks with a watched joint within `ON_LIMIT` of a limit; NaN as above.
+        Share of ticks with a watched joint within `metrics.ON_LIMIT` of a limit of this run; NaN as above.
     task_error : float
         Mean norm of the Cartesian error [m/s, rad/s].
     """
@@ -99,8 +100,14 @@ def cell_summary(ticks: pl.DataFrame, times: pl.DataFrame | None, scenario: Scen
         As `Store.ticks` and `Store.times` give them.
     scenario : Scenario
         What was run.
+
+    Raises
+    ------
+    FrameError
+        When the ticks are none of this scenario's.
     """
-    peak, watched, on_limit = _motion(ticks, scenario)
+    # The report's own figures: what both show of a cell is computed once.
+    motion = Motion.of(Ticks(scenario, ticks))
     length = ticks["eps"].list.eval(pl.element() ** 2).list.sum().sqrt()
     return CellSummary(
         ticks=len(ticks),
@@ -111,27 +118,16 @@ def cell_summary(ticks: pl.DataFrame, times: pl.DataFrame | None, scenario: Scen
         c=_median(times, "c"),
         fixed_error=float(ticks["fixed_error"].to_numpy().max()),
         bound_violation=float(ticks["bound_violation"].to_numpy().max()),
-        peak_acceleration=peak,
-        watched_acceleration=watched,
+        peak_acceleration=_or_nan(motion.peak_acceleration),
+        watched_acceleration=_or_nan(motion.watched_acceleration),
         failed=float(np.mean(ticks["status"].to_numpy() != scenario.expects.value)),
-        on_limit=on_limit,
+        on_limit=_or_nan(motion.on_limit),
         task_error=float(length.to_numpy().mean()),
     )
 
 
-def _motion(ticks: pl.DataFrame, scenario: Scenario) -> tuple[float, float, float]:
-    """Peak acceleration of all and of the watched joints, share of ticks on a limit; NaN without a closed loop."""
-    robot, joints, t = scenario.robot, list(scenario.watched_joints), ticks["t"].to_numpy()
-    if scenario.states is not None or not np.allclose(np.diff(t), scenario.dt):
-        return float("nan"), float("nan"), float("nan")
-    q, qd = ticks["q"].to_numpy(), ticks["qd"].to_numpy()
-    acceleration = np.abs(np.diff(qd, axis=0, prepend=0.0)) / scenario.dt / robot.qdd_max
-    if not joints:
-        return float(acceleration.max()), float("nan"), float("nan")
-    angle = np.vstack([q, q[-1] + scenario.dt * qd[-1]])[:, joints]
-    distance = np.minimum(robot.q_max[joints] - angle, angle - robot.q_min[joints]).min(axis=1)
-    on_limit = float(np.mean(distance <= ON_LIMIT))
-    return float(acceleration.max()), float(acceleration[:, joints].max()), on_limit
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def _median(times: pl.DataFrame | None, column: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import casadi as ca
 
@@ -15,9 +15,6 @@ from .fields import SIGNALS, ModeText, c_name, field_of, row_statements, sources
 if TYPE_CHECKING:
     from ..formulations import Hierarchy, Input, Lowered, Mode
     from ..robots import Robot
-
-# What a command is judged by, whatever its level asked for.
-_JUDGED: Final = ("J_free", "J_fixed", "qd_lo", "qd_hi")
 
 
 @dataclass(frozen=True)
@@ -116,10 +113,8 @@ def _labels(lowered: Lowered) -> tuple[str, ...]:
 
 def _level_code(lowered: Lowered) -> LevelCode:
     tick = lowered.tick
-    # Asking for these may add inputs, as they do where the interpreted step judges by them.
-    judged = {name: getattr(tick, name) for name in _JUDGED} | {"v_fixed": tick.v_fixed}
     data = dict(zip(DATA, lowered.function(*(given.symbol for given in lowered.inputs)), strict=True))
-    outputs = {c_name(name): ca.SX(value).T for name, value in (data | judged).items() if value.numel()}
+    outputs = {c_name(name): ca.SX(value).T for name, value in data.items() if value.numel()}
     values = ca.cse([ca.densify(value) for value in outputs.values()])
     function = ca.Function("level", [given.symbol for given in tick.inputs], values)
     sources = sources_of({given.name: field_of(given) for given in tick.inputs}) | {ABOVE: "above"}

@@ -10,7 +10,7 @@ from .guiding_settings import GuidingSettings
 from .hand import CHARACTERS, EXPERT, NOVICE, Character
 from .ik_result import IkResult, IkStatus
 from .inverse_kinematics import InverseKinematics, inverse_kinematics
-from .loop import AnyStep, Command, Guide, Step, Trajectory, simulate
+from .loop import AnyStep, Command, Guide, Trajectory, simulate
 from .make_guiding import make_guiding
 from .operator import Operator
 from .paths import Path, PathFollower, SemicirclePath
@@ -54,7 +54,6 @@ __all__ = [
     "Push",
     "SemicirclePath",
     "SpiralPath",
-    "Step",
     "Trajectory",
     "export_guiding",
     "inverse_kinematics",

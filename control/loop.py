@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from ..formulations import DEFAULT_DT, InputError
 from ..robots import real_array
+from .checks import checked_period
+from .last_command import LastCommand, is_stop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import ArrayLike, NDArray
 
-    from ..formulations import Input, Mode, StepResult
+    from ..formulations import Input, Mode
     from ..robots import Robot
     from ..solvers import Status
 
@@ -47,7 +49,7 @@ class Command(Protocol):
 
 
 class AnyStep(Protocol):
-    """A control cycle, interpreted (`make_step`) or compiled (`compile_step`)."""
+    """A control cycle: interpreted, of a baseline (`make_step` makes both), or compiled (`compile_step`)."""
 
     @property
     def robot(self) -> Robot:
@@ -66,13 +68,6 @@ class AnyStep(Protocol):
         """Names of what a call takes by keyword beyond the state and the twist."""
 
     def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> Command:
-        """Give the command at a state."""
-
-
-class Step(AnyStep, Protocol):
-    """What `simulate` asks of a controller: a cycle that tells all; `make_step` makes one."""
-
-    def __call__(self, q: ArrayLike, v: ArrayLike, **inputs: ArrayLike) -> StepResult:
         """Give the command at a state."""
 
 
@@ -107,8 +102,9 @@ class Trajectory:
     active : tuple of tuple of str
         Names of the rows that held the command back.
     fixed_error, bound_violation, sigma_min, setup_time, solve_time : ndarray, shape (N,)
-        As in `StepResult`.
+        As in `StepResult`; NaN of a compiled step, which tells none of them.
     message : tuple of str
+        As in `StepResult`; empty of a compiled step.
     q_end : ndarray, shape (nv,)
         State after the last command [rad or m].
     """
@@ -137,11 +133,8 @@ class Trajectory:
         return acceleration
 
 
-_PER_TICK = ("status", "active", "message")
-
-
 def simulate(
-    step: Step,
+    step: AnyStep,
     guide: Guide,
     q0: ArrayLike,
     duration: float,
@@ -155,9 +148,10 @@ def simulate(
 
     Parameters
     ----------
-    step : Step
+    step : InterpretedStep, BaselineStep or CompiledStep
         The controller; `dt` is handed to it at every tick and, where it takes them, the last command as `qd_prev` and
-        its difference from the one before over `dt` as `qdd_prev` (the arm starts at rest).
+        its difference from the one before over `dt` as `qdd_prev`: zero at the start, where the arm is at rest, and
+        after a safe stop, whose acceleration is not one to go on with.
     guide : Guide
         Gives the twist asked for.
     q0 : array_like, shape (nv,)
@@ -165,7 +159,7 @@ def simulate(
     duration : float
         [s].
     dt : float
-        Control period [s].
+        Control period, 1e-5 to 1 [s].
     on_tick : callable, optional
         Called with (ticks done, ticks in all) after every tick.
 
@@ -178,39 +172,49 @@ def simulate(
     ValueError
         Naming the input that is not usable.
     """
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise ValueError(f"dt: expected a positive number of seconds, got {dt}")
+    dt = checked_period(dt)
     ticks = round(duration / dt) if np.isfinite(duration) else 0
     if ticks < 2:
         raise ValueError(f"duration: expected at least two periods of {dt:g} s, got {duration}")
     free = list(step.mode.free_rows)
     q = real_array("q0", q0, InputError).copy()
-    memory = {name: np.zeros(step.robot.nv) for name in ("qd_prev", "qdd_prev") if name in step.inputs}
-    qd = np.zeros(step.robot.nv)
-    states, twists, positions, results = [], [], [], []
+    last = LastCommand(step.robot.nv, dt)
+    states: list[Array] = []
+    twists: list[Array] = []
+    positions: list[Array] = []
+    results: list[Command] = []
     for tick in range(ticks):
         pose = step.robot.pose(q)
         v = (step.mode.twist_map_at(pose) @ guide.twist(tick * dt, pose))[free]
-        result = step(q, v, dt=dt, **memory)
+        result = step(q, v, dt=dt, **last.inputs(step))
         states.append(q)
         twists.append(v)
         positions.append(pose[:3, 3])
         results.append(result)
-        now = {"qd_prev": result.qd, "qdd_prev": (result.qd - qd) / dt}
-        memory = {name: now[name] for name in memory}
-        qd = result.qd
-        q = q + dt * qd
+        last.sent(result.qd, stop=is_stop(step, result.status))
+        q = q + dt * result.qd
         if on_tick is not None:
             on_tick(tick + 1, ticks)
-    columns: dict[str, object] = {
-        field.name: [getattr(result, field.name) for result in results] for field in fields(results[0])
-    }
-    columns["iterations"] = [-1 if result.iterations is None else result.iterations for result in results]
     return Trajectory(
         t=np.arange(ticks, dtype=np.float64) * dt,
         q=np.array(states),
         v=np.array(twists),
+        qd=np.array([result.qd for result in results]),
         position=np.array(positions),
+        eps=np.array([result.eps for result in results]),
+        status=tuple(result.status for result in results),
+        iterations=np.array([-1 if result.iterations is None else result.iterations for result in results]),
+        active=tuple(result.active for result in results),
+        fixed_error=_told(results, "fixed_error"),
+        bound_violation=_told(results, "bound_violation"),
+        sigma_min=_told(results, "sigma_min"),
+        setup_time=_told(results, "setup_time"),
+        solve_time=_told(results, "solve_time"),
+        message=tuple(getattr(result, "message", "") for result in results),
         q_end=q,
-        **{name: tuple(c) if name in _PER_TICK else np.array(c) for name, c in columns.items()},  # type: ignore[arg-type]  # the columns are named after StepResult's fields, which mypy can't follow
     )
+
+
+def _told(results: list[Command], name: str) -> Array:
+    """One figure of every tick, NaN where the step doesn't tell it."""
+    return np.array([getattr(result, name, np.nan) for result in results], dtype=np.float64)

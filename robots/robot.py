@@ -151,7 +151,8 @@ class Robot:
         matrix = pin.computeFrameJacobian(
             self.model, data, self.to_pinocchio(q), self._frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         )
-        return np.array(matrix, dtype=np.float64)
+        # A matrix of one column comes as a vector.
+        return np.array(matrix, dtype=np.float64).reshape(6, self.nv)
 
     def jdot_qd(self, q: ArrayLike, qd: ArrayLike) -> FloatArray:
         """

@@ -13,7 +13,7 @@ from .possible import Possible
 
 if TYPE_CHECKING:
     import polars as pl
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     from ...formulations import Mode
     from ..scenarios import Scenario
@@ -144,11 +144,7 @@ class Ticks:
 
     def limit(self, name: str) -> Array:
         """Return `q_min`, `q_max`, `qd_max` or `qdd_max` as the scenario has it, shape (nv,)."""
-        own: ArrayLike = getattr(self.scenario.robot, name)
-        value: Array = np.broadcast_to(
-            np.asarray(self.scenario.inputs.get(name, own), float), (self.scenario.robot.nv,)
-        )
-        return value
+        return self.scenario.limit(name)
 
     @cached_property
     def phase(self) -> NDArray[np.int64]:

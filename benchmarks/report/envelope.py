@@ -63,10 +63,7 @@ def envelope(scenario: Scenario, joint: int) -> Envelope | None:
     -------
     Envelope or None
     """
-    limits = {}
-    for name in ("q_min", "q_max", "qd_max", "qdd_max"):
-        given = np.asarray(scenario.inputs.get(name, getattr(scenario.robot, name)), dtype=np.float64)
-        limits[name] = float(np.broadcast_to(given, (scenario.robot.nv,))[joint])
+    limits = {name: float(scenario.limit(name)[joint]) for name in ("q_min", "q_max", "qd_max", "qdd_max")}
     low, high = limits["q_min"], limits["q_max"]
     if not (np.isfinite(low) and np.isfinite(high)):
         return None

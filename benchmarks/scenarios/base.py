@@ -133,6 +133,20 @@ class Scenario:
         if self.states is not None:
             _check_states(self.name, self.states, nv)
 
+    def limit(self, name: str) -> Array:
+        """Return `q_min`, `q_max`, `qd_max` or `qdd_max` of the run: its own where `inputs` has one, else the robot's.
+
+        Everything that measures a run by its limits takes them from here.
+
+        Returns
+        -------
+        ndarray, shape (nv,)
+            [rad or m, and per second].
+        """
+        given: ArrayLike = self.inputs.get(name, getattr(self.robot, name))
+        value: Array = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.robot.nv,))
+        return value
+
     @property
     def modes(self) -> tuple[Mode, ...]:
         """Its motion modes, each once, in order."""

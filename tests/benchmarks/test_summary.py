@@ -6,9 +6,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from kinqp.benchmarks import Spread, cell_summary, get_scenario
+from kinqp.benchmarks import Spread, cell_summary
+from kinqp.benchmarks.metrics import cell_record
+from kinqp.benchmarks.report.envelope import envelope
+from tests.benchmarks.hand_made import ELBOW, column, scenario, ticks_frame
 
-SCENARIO = get_scenario("semicircle")
+SCENARIO = scenario(4)
 
 
 def test_percentiles_are_values_that_occurred() -> None:
@@ -32,6 +35,7 @@ def ticks() -> pl.DataFrame:
             "iterations": [1, 2, 3, 6],
             "fixed_error": [0.0, 1e-9, 0.0, 0.0],
             "bound_violation": [0.0, 0.0, 2e-9, 0.0],
+            "sigma_min": [0.1] * 4,
             "q": pl.Series(q, dtype=pl.Array(pl.Float64, 7)),
             "qd": pl.Series(qd, dtype=pl.Array(pl.Float64, 7)),
             "eps": [[3.0, 4.0, 0.0]] * 4,
@@ -67,8 +71,7 @@ def test_a_cell_is_summed_up() -> None:
     # From rest to -0.02 rad/s in 1 ms are 20 rad/s^2, twice the limit of 10.
     assert m.peak_acceleration == m.watched_acceleration == pytest.approx(2.0)
     assert m.failed == 0.25
-    # On the limit at three of four ticks and, 5e-6 rad off it, no longer at the end.
-    assert m.on_limit == pytest.approx(3 / 5)
+    assert m.on_limit == 0.75
     assert m.task_error == pytest.approx(5.0)
 
 
@@ -80,3 +83,22 @@ def test_without_times_or_a_closed_loop_there_are_no_figures() -> None:
     m = cell_summary(sampled, None, SCENARIO)
     assert np.isnan([m.peak_acceleration, m.watched_acceleration, m.on_limit]).all()
     assert m.failed == 0.25
+
+
+def test_table_and_report_measure_a_run_by_its_own_limits() -> None:
+    """Both of the same limits, those of the scenario, whatever the robot's are: all three halved here."""
+    robot = SCENARIO.robot
+    own = {"qdd_max": 5.0, "qd_max": 0.5 * robot.qd_max, "q_min": 0.5 * robot.q_min, "q_max": 0.5 * robot.q_max}
+    narrow = scenario(4, inputs=own)
+    frame = ticks_frame(
+        4, q=column(4, values=[0.0, 0.0, 0.5 * robot.q_min[ELBOW], 0.0]), qd=column(4, values=[0.0, 0.01, 0.01, 0.0])
+    )
+    table, report = cell_summary(frame, None, narrow), cell_record(frame, None, narrow).motion
+    # 0.01 rad/s within 1 ms: 10 rad/s^2.
+    assert table.peak_acceleration == report.peak_acceleration == pytest.approx(2.0)
+    assert table.watched_acceleration == report.watched_acceleration == pytest.approx(2.0)
+    assert table.on_limit == report.on_limit == 0.25
+    assert report.peak_speed == pytest.approx(0.01 / own["qd_max"][ELBOW])
+    shown = envelope(narrow, ELBOW)
+    assert shown is not None
+    np.testing.assert_allclose(np.deg2rad(shown.q[[0, -1]]), [own["q_min"][ELBOW], own["q_max"][ELBOW]])

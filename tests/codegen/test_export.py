@@ -129,7 +129,8 @@ def test_what_remembers_nothing_is_given_no_memory() -> None:
         assert text not in files["main.c"] + files["recorded.h"]
         assert text not in files["README.md"].replace("send output.qd", "").replace("represent", "")
     files = exported("joint-space-robust", *ROBUST_CASES["joint-space-robust"])
-    for line in ("input.qd_prev[i] = sent[i];", "parameters.qdd_prev[i] = (output.qd[i] - sent[i]) / parameters.dt;"):
+    change = "output.stop == KINQP_STOP_NONE ? (output.qd[i] - sent[i]) / parameters.dt : 0.0;"
+    for line in ("input.qd_prev[i] = sent[i];", f"parameters.qdd_prev[i] = {change}"):
         assert line in files["README.md"]
     assert "parameters.qdd_prev[i] = 0.0;" in files["README.md"]
 

@@ -104,6 +104,10 @@ def test_an_unknown_mode_fails_and_stops() -> None:
     given.q[0:7] = [0.1, 0.5, 0.1, -1.0, 0.1, 0.5, 0.1]
     given.v[0] = 0.1
     assert lib.kinqp_multi_guide(parameters, state, given, output) == 0
+    sent = np.array(list(output.qd))
     given.mode = 7
-    assert STATUSES[lib.kinqp_multi_guide(parameters, state, given, output)] is Status.FAILED
-    assert not any(output.qd)
+    for _ in range(100):
+        assert STATUSES[lib.kinqp_multi_guide(parameters, state, given, output)] is Status.FAILED
+        assert (np.abs(np.array(list(output.qd)) - sent) <= 1.000001e-2).all(), "braking, 10 rad/s^2 for 1 ms"
+        sent = np.array(list(output.qd))
+    assert not sent.any()

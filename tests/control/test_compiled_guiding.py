@@ -61,8 +61,8 @@ def test_the_same_tick_the_same_bits():
 
 
 class TestFaults:
-    def test_what_is_not_finite_is_refused_and_the_arm_stands_still(self):
-        controller = CompiledGuiding(ROBOT, "joint-space", MODES, GuidingSettings(max_failures=3))
+    def test_where_samples_are_lost_the_arm_brakes_and_stands_still(self):
+        controller = CompiledGuiding(ROBOT, "joint-space", MODES, GuidingSettings(max_failures=3, hold_ticks=0))
         for _ in range(5):
             moving = controller(START, [0, 20.0, 0, 0, 0, 0])
         assert moving.qd.any()
@@ -76,11 +76,12 @@ class TestFaults:
                 for _ in range(3)
             ]
             assert all(code != 0 for code in codes)
-            assert list(controller._output.qd) == [0.0] * 7
+            assert (np.abs(list(controller._output.qd)) < 0.01).all(), "one tick of 20 N, less three of braking"
             assert not np.isnan(list(controller._output.v_actual)).any()
             assert controller.phase is GuidingPhase.STOPPING
             assert "3 ticks in a row were not solved" in controller.reason
-        result = controller(START, [0, 20.0, 0, 0, 0, 0])
+        for _ in range(20):
+            result = controller(START, [0, 20.0, 0, 0, 0, 0])
         assert result.phase is GuidingPhase.STOPPED
         controller.resume()
         results = [controller(START, [0, 20.0, 0, 0, 0, 0]) for _ in range(3)]

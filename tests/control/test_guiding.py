@@ -93,7 +93,6 @@ class TestBadInput:
         [
             (START[:6], np.zeros(6), r"q: expected shape \(7,\), got \(6,\)"),
             (START, np.zeros(3), r"wrench: expected shape \(6,\), got \(3,\)"),
-            (START, [0, np.nan, 0, 0, 0, 0], "wrench: expected finite numbers"),
             (START, "pull", "wrench: expected real numbers, got entries of type <U4"),
         ],
     )
@@ -136,7 +135,7 @@ class TestBadInput:
             guiding(formulation="task-priority", compiled=True)
         with pytest.raises(ValueError, match="modes: expected at least one, each once, got free, free"):
             guiding(["free", "free"])
-        with pytest.raises(ValueError, match="dt: expected a positive number of seconds"):
+        with pytest.raises(ValueError, match="dt: expected 1e-05 to 1 s"):
             guiding(dt=0.0)
         with pytest.raises(ValueError, match="duration: expected at least two periods"):
             simulate_guiding(guiding(), constant(0, 0, 0, 0, 0, 0), START, 1e-3)

@@ -82,3 +82,21 @@ def scara() -> Robot:
         path = Path(folder) / "scara.urdf"
         path.write_text("\n".join(parts), encoding="utf-8")
         return load_robot(path)
+
+
+@functools.cache
+def one_joint(kind: str) -> Robot:
+    """Load an arm of one revolute or prismatic joint, its tool 0.3 m off the joint's axis."""
+    text = (
+        '<robot name="one_joint"><link name="base"/><link name="tool"/><link name="link"><inertial>'
+        '<origin xyz="0.1 0 0"/><mass value="1"/>'
+        '<inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>'
+        f'<joint name="joint" type="{kind}"><parent link="base"/><child link="link"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="10"/></joint>'
+        '<joint name="flange" type="fixed"><parent link="link"/><child link="tool"/><origin xyz="0.3 0 0"/></joint>'
+        "</robot>"
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "one_joint.urdf"
+        path.write_text(text, encoding="utf-8")
+        return load_robot(path)
