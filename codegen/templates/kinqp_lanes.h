@@ -32,6 +32,7 @@ typedef KINQP_VECTOR(long long, 32) kinqp_bits;
 #define kinqp_part_fill(x) ((kinqp_part){(x), (x), (x), (x)})
 #define kinqp_bits_fill(x) ((kinqp_bits){(x), (x), (x), (x)})
 #define kinqp_part_root(x) ((kinqp_part)_mm256_sqrt_pd((__m256d)(x)))
+#define kinqp_part_least(x, y) ((kinqp_part)_mm256_min_pd((__m256d)(x), (__m256d)(y)))
 #define kinqp_bits_any(x) (((x)[0] | (x)[2] | (x)[1] | (x)[3]) != 0)
 #else
 typedef KINQP_VECTOR(double, 16) kinqp_part;
@@ -43,8 +44,10 @@ typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 #if defined(__SSE2__)
 #include <emmintrin.h>
 #define kinqp_part_root(x) ((kinqp_part)_mm_sqrt_pd((__m128d)(x)))
+#define kinqp_part_least(x, y) ((kinqp_part)_mm_min_pd((__m128d)(x), (__m128d)(y)))
 #else
 #define kinqp_part_root(x) ((kinqp_part){sqrt((x)[0]), sqrt((x)[1])})
+#define kinqp_part_least(x, y) kinqp_part_choose(y, x, x, y)
 #endif
 #endif
 #define kinqp_part_load(p) (*(const kinqp_part *)(const void *)(p))
@@ -52,8 +55,11 @@ typedef KINQP_VECTOR(long long, 16) kinqp_bits;
 /* a where x > y, else b; and the same for a condition given as bits. */
 #define kinqp_part_choose(x, y, a, b) kinqp_bits_choose((kinqp_bits)((x) > (y)), a, b)
 #define kinqp_part_excludes_zero(lo, hi) kinqp_bits_any(~((kinqp_bits)((lo) <= 0.0) & (kinqp_bits)((hi) >= 0.0)))
-/* Bits that are not zero where x is outside of [least, most]; NaN is outside of everything. */
-#define kinqp_part_misses(x, least, most) (~((kinqp_bits)((x) >= (least)) & (kinqp_bits)((x) <= (most))))
+#define kinqp_part_size(x) ((kinqp_part)((kinqp_bits)(x) & kinqp_bits_fill(0x7fffffffffffffffLL)))
+/* Bits that are not zero where x is not at most, or not at least, y, or one of them is not a number; where x is above y. */
+#define kinqp_part_exceeds(x, y) (~(kinqp_bits)((x) <= (y)))
+#define kinqp_part_lacks(x, y) (~(kinqp_bits)((x) >= (y)))
+#define kinqp_part_above(x, y) ((kinqp_bits)((x) > (y)))
 #define kinqp_bits_none ((kinqp_bits)(kinqp_part_fill(0.0)))
 #define kinqp_bits_choose(where, a, b) ((kinqp_part)(((kinqp_bits)(a) & (where)) | ((kinqp_bits)(b) & ~(where))))
 #else
@@ -63,11 +69,15 @@ typedef int kinqp_bits;
 #define KINQP_PARTS 4
 #define kinqp_part_fill(x) (x)
 #define kinqp_part_root(x) sqrt(x)
+#define kinqp_part_least(x, y) ((x) < (y) ? (x) : (y))
+#define kinqp_part_size(x) fabs(x)
 #define kinqp_part_load(p) (*(p))
 #define kinqp_part_store(p, x) (*(p) = (x))
 #define kinqp_part_choose(x, y, a, b) ((x) > (y) ? (a) : (b))
 #define kinqp_part_excludes_zero(lo, hi) (!((lo) <= 0.0 && (hi) >= 0.0))
-#define kinqp_part_misses(x, least, most) (!((x) >= (least) && (x) <= (most)))
+#define kinqp_part_exceeds(x, y) (!((x) <= (y)))
+#define kinqp_part_lacks(x, y) (!((x) >= (y)))
+#define kinqp_part_above(x, y) ((x) > (y))
 #define kinqp_bits_none 0
 #define kinqp_bits_any(x) ((x) != 0)
 #endif
