@@ -99,7 +99,7 @@ def test_a_wrong_answer_is_noticed(tmp_path: Path) -> None:
     [
         "parameters.qdd_prev[i] = change[i];",
         "input.qd_prev[i] = sent[i];",
-        "change[i] = (now[i] - sent[i]) / parameters.dt;",
+        "change[i] = output.stop == KINQP_STOP_NONE ? (now[i] - sent[i]) / parameters.dt : 0.0;",
         "sent[i] = now[i];",
     ],
 )
