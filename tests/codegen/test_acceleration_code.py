@@ -192,5 +192,5 @@ def test_exported_code_gives_the_recorded_answers(modes: list[str], tmp_path: Pa
     assert "input.qd_prev[i] = sent[i];" in readme
     assert "output.qd is the fastest admissible braking: the safe stop" in readme
     header = (tmp_path / "lbr.h").read_text()
-    assert "the fastest admissible braking unless solved" in header
+    assert "braking unless solved" in header
     assert "double qd_prev[7]; /* joint velocities of the tick before [rad/s or m/s] */" in header

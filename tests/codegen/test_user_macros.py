@@ -35,7 +35,7 @@ def exported(formulation: str) -> dict[str, str]:
     """Text by file name of a whole export, the hand-guiding controller and its recorded sessions included."""
     with (
         tempfile.TemporaryDirectory() as folder,
-        mock.patch.object(export, "TICKS_PER_MODE", 2),
+        mock.patch("kinqp.codegen.recorded.TICKS_PER_MODE", 2),
         mock.patch("kinqp.control.export_guiding.TICKS_PER_MODE", 2),
         mock.patch.object(export, "_measured", return_value=dict.fromkeys(("code", "stack", "compiler"), "")),
     ):
