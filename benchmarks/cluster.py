@@ -86,8 +86,9 @@ def on_a_cluster(tasks: Sequence[Task], config: SweepConfig, scheduler: str) -> 
                 yield _result(future, futures.pop(future))
         except (distributed.CancelledError, distributed.TimeoutError, OSError) as error:
             # With its scheduler a client loses all that it has asked for.
+            why = " ".join(str(error).split())  # Dask's words may go over several lines
             raise ClusterError(
-                f"--scheduler: expected the Dask scheduler at {scheduler} until all is done, and it is gone ({error}); "
+                f"--scheduler: expected the Dask scheduler at {scheduler} until all is done, and it is gone ({why}); "
                 "what came back is kept: start one and continue with --resume"
             ) from error
         finally:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from kinqp.codegen import compile_step
-from kinqp.codegen.fields import mode_symbol, prefix_of
+from kinqp.codegen.fields import mode_symbols, prefix_of
 from kinqp.codegen.model import StepCode, step_code
 from kinqp.codegen.render import render_batch, render_step
 from kinqp.control import export_guiding
@@ -64,7 +64,7 @@ def test_c_without_its_comments_does_not_know_the_name(name: str) -> None:
 def test_files_and_symbols_are_plain(name: str) -> None:
     robot, made, mode = called(name)
     assert re.fullmatch(r"kinqp_?[a-z0-9_]{,170}", prefix_of(robot.name, made.name), flags=re.ASCII)
-    assert re.fullmatch(r"[a-z0-9_]*", mode_symbol(mode), flags=re.ASCII)
+    assert re.fullmatch(r"[a-z0-9_]*", mode_symbols([mode])[0], flags=re.ASCII)
 
 
 def test_what_is_exported_compiles_and_reads_the_same(tmp_path: Path) -> None:

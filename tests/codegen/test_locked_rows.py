@@ -54,5 +54,7 @@ def test_so_is_one_of_a_slow_hand_where_rows_are_active(
     case = ("ur5e", formulation, mode)
     for step in (compiled(*case, quick=True), interpreted(*case)):
         result = step(q, v, qd_prev=qd_prev)
-        assert np.abs(rows @ result.qd).max() <= 1e-9
         assert result.status in (Status.SOLVED, Status.INACCURATE)
+        # A safe stop brakes from the last command, which is anything here.
+        most = 1e-9 if result.status is Status.SOLVED else np.abs(rows @ qd_prev).max() + 1e-9
+        assert np.abs(rows @ result.qd).max() <= most

@@ -98,7 +98,8 @@ def test_the_guiding_controller_around_every_formulation(formulation: str, axes:
 
 def test_an_assertion_that_does_not_hold_stops_a_debug_build(tmp_path: Path) -> None:
     """And is not there in any other one."""
-    text = str(math_header()) + "int main(int count, char **given) { (void)given; KINQP_ASSERT(count > 1); return 0; }\n"
+    program = "int main(int count, char **given) { (void)given; KINQP_ASSERT(count > 1); return 0; }\n"
+    text = str(math_header()) + program
     (tmp_path / "main.c").write_text(text, encoding="utf-8")
     run(need("gcc"), "-std=c99", "main.c", "-o", "plain", "-lm", cwd=tmp_path)
     run(need("gcc"), "-std=c99", "-DKINQP_DEBUG", "main.c", "-o", "debug", "-lm", cwd=tmp_path)
