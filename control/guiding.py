@@ -12,6 +12,7 @@ from .checks import checked_array, checked_modes, checked_period
 from .guiding_result import GuidingPhase, GuidingResult
 from .guiding_settings import GuidingSettings
 from .guiding_unit import GuidingUnit
+from .last_command import LastCommand
 from .set_inputs import checked_values, index_of_mode
 
 if TYPE_CHECKING:
@@ -99,8 +100,7 @@ class GuidingController:
         self._reason = ""
         self._failures = 0
         self._stop_asked = False
-        self._qd: Array = np.zeros(self.robot.nv)
-        self._qdd: Array = np.zeros(self.robot.nv)
+        self._last = LastCommand(self.robot.nv, self.dt)
         self._limit: Array = self._target.copy()
         self._unit = next(iter(self._units.values()))
         self._wanted: GuidingUnit | None = None
@@ -199,26 +199,28 @@ class GuidingController:
             self._failures = 0 if sampled else self._failures
             return self._come_to_rest(position)
         stopping = self._phase is GuidingPhase.STOPPING
-        asked = self._unit.ask(position, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=stopping)
+        asked = self._unit.ask(
+            position, self._wrench, self._v, self._anchor, self._last.qd, self._limit, stopping=stopping
+        )
         if not all(np.isfinite(values).all() for values in asked):
             if sampled:
                 self._count_failure("no finite answer of the law")
             return self._brake(position, Status.FAILED)
         self._limit = asked.qd_limit
-        tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._qd, self._qdd)
+        tick = self._unit.step_at(position, asked.v, asked.v_fixed, asked.qd_limit, self._last.qd, self._last.qdd)
         # Limits that leave no way back to the anchor must not keep the hand from moving.
         yielded = tick.status is not Status.SOLVED and bool(asked.v_fixed.any())
         if yielded:
-            tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._qd, self._qdd)
+            tick = self._unit.step_at(position, asked.v, None, asked.qd_limit, self._last.qd, self._last.qdd)
         if tick.status is not Status.SOLVED and sampled:
             self._count_failure(tick.status.value)
-        if not self._unit.usable(tick.status):
+        if self._unit.is_stop(tick.status):
             stopped = self._brake(position, tick.status)
             return stopped._replace(v=asked.v, iterations=tick.iterations, drift=asked.drift, yielded=yielded)
         self._v = asked.v
         if tick.status is Status.SOLVED and sampled:
             self._failures = 0
-        self._remember(tick.qd)
+        self._last.sent(tick.qd, stop=False)
         return GuidingResult(
             tick.qd,
             asked.v,
@@ -243,12 +245,12 @@ class GuidingController:
         if usable:
             # After more ticks than are held nothing is expected of the next sample.
             expected = measured if last is None or self._held > self.settings.hold_ticks else last
-            position = self._unit.observe(measured, expected, self._qd)
+            position = self._unit.observe(measured, expected, self._last.qd)
             usable = bool(np.isfinite(position).all())
         if usable:
             self._held, self._wrench = 0, pull
         else:
-            position = (np.zeros(self.robot.nv) if last is None else last) + self.dt * self._qd
+            position = (np.zeros(self.robot.nv) if last is None else last) + self.dt * self._last.qd
             self._held = min(self._held, self.settings.hold_ticks) + 1
         if usable or last is not None:
             self._position = position
@@ -262,11 +264,11 @@ class GuidingController:
     def _brake(self, q: Array, status: Status) -> GuidingResult:
         """The safe stop; the hand goes on from what it leaves of the motion."""
         self._brake_from_last(q)
-        left = self._unit.guided_velocity(q, self._qd)
+        left = self._unit.guided_velocity(q, self._last.qd)
         self._v = left if np.isfinite(left).all() else np.zeros_like(left)
         nothing = np.zeros_like(left)
         return GuidingResult(
-            self._qd,
+            self._last.qd,
             nothing,
             self._v,
             status,
@@ -282,11 +284,11 @@ class GuidingController:
     def _come_to_rest(self, q: Array) -> GuidingResult:
         """Bring what still moves to rest, then do what was asked for: nothing is asked of the tool any more."""
         assert self._anchor is not None, "anchored at the first tick"  # noqa: S101  # for mypy
-        asked = self._unit.ask(q, self._wrench, self._v, self._anchor, self._qd, self._limit, stopping=True)
+        asked = self._unit.ask(q, self._wrench, self._v, self._anchor, self._last.qd, self._limit, stopping=True)
         self._limit = asked.qd_limit
         self._brake_from_last(q)
         done = self._unit
-        if not self._qd.any():
+        if not self._last.qd.any():
             if self._stop_asked:
                 self._phase = GuidingPhase.STOPPED
             else:
@@ -296,13 +298,13 @@ class GuidingController:
                 self._v = np.zeros(self._unit.mode.m_free)
                 self._anchor = self._unit.anchor_at(q)
         zero = np.zeros(done.mode.m_free)
-        actual = zero if not self._qd.any() else done.guided_velocity(q, self._qd)
+        actual = zero if not self._last.qd.any() else done.guided_velocity(q, self._last.qd)
         return GuidingResult(
-            self._qd,
+            self._last.qd,
             zero,
             actual,
             # A brake goes by its acceleration limits first: after a jump in positions or limits it may not keep these.
-            Status.SOLVED if done.keeps_limits(q, self._qd, self._limit) else Status.INACCURATE,
+            Status.SOLVED if done.keeps_limits(q, self._last.qd, self._limit) else Status.INACCURATE,
             0,
             (),
             done.mode,
@@ -313,10 +315,4 @@ class GuidingController:
         )
 
     def _brake_from_last(self, q: Array) -> None:
-        self._qd = self._unit.brake(q, self._qd, self._limit)
-        # The acceleration of a stop is not one to go on with: the arm would be carried past its rest.
-        self._qdd = np.zeros_like(self._qd)
-
-    def _remember(self, qd: Array) -> None:
-        self._qdd = (qd - self._qd) / self.dt
-        self._qd = qd
+        self._last.sent(self._unit.brake(q, self._last.qd, self._limit), stop=True)

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..formulations import Limits, unmet_limits
 from ..formulations.buffered import BufferedFunction
-from ..solvers import Status
 from .guiding_law import GuidingLaw
+from .last_command import is_stop
 from .set_inputs import check_order
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..formulations import Input
+    from ..solvers import Status
     from .guiding_settings import GuidingSettings
     from .loop import AnyStep, Command
 
@@ -60,8 +61,6 @@ class GuidingUnit:
         self._values: Final = {given.name: given.default for given in law.settable if given.default is not None}
         for name, default in {**self._values, "dt": np.array([dt])}.items():
             self._put(name, default)
-        # A compiled step that keeps to admissible points has a command to send also where it is capped.
-        self._feasible: Final = bool(getattr(step, "feasible", False))
         self._remembers: Final = "qd_prev" in step.inputs
         self._remembers_change: Final = "qdd_prev" in step.inputs
         self._specs: Final = {spec.name: spec for spec in (*law.settable, *step.specs) if spec.name not in _GIVEN}
@@ -150,9 +149,9 @@ class GuidingUnit:
             inputs["qdd_prev"] = qdd_prev
         return self._step(q, v, **inputs)
 
-    def usable(self, status: Status) -> bool:
-        """Whether a command of the step with this status is to be sent; otherwise it is the safe stop."""
-        return status is Status.SOLVED or (self._feasible and status is Status.MAX_ITERATIONS)
+    def is_stop(self, status: Status) -> bool:
+        """Whether a command of this status is the step's own safe stop."""
+        return is_stop(self._step, status)
 
     def brake(self, q: Array, qd_prev: Array, qd_limit: Array) -> Array:
         """Fastest admissible braking, shape (nv,)."""
